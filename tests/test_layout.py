@@ -1,6 +1,7 @@
 """The layers of the package and their rooms: imports between them run one way, and none runs in a circle.
 
-Every import counts: at the top of a module, inside a function, for types alone, and by a dotted name in a table of lazy names.
+Every import counts: at the top of a module, inside a function, and for types alone. What a layer's door names counts as an import of the
+module behind it.
 """
 
 from __future__ import annotations
@@ -66,6 +67,22 @@ def _modules() -> dict[str, Path]:
 MODULES = _modules()
 
 
+def _named(stub: Path) -> dict[str, str]:
+    """The names of a door, each with the module behind it, as `__init__.pyi` has them."""
+    found = {}
+    for node in ast.parse(stub.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ImportFrom):
+            found |= {alias.name: str(node.module) for alias in node.names}
+    return found
+
+
+#: The door of each layer, and of `core`: the module behind each name.
+DOORS = {
+    layer: {name: f"warpflat.{layer}.{module}" for name, module in _named(PACKAGE / layer / "__init__.pyi").items()}
+    for layer in ("core", *LAYERS)
+}
+
+
 @functools.cache
 def _nodes(path: Path) -> list[ast.AST]:
     """All nodes of a file; the first is its module."""
@@ -82,9 +99,10 @@ def _imports(module: str) -> set[str]:
         elif isinstance(node, ast.ImportFrom):
             # Kernels import each other relatively, as they stand in a folder of their own.
             source = "warpflat.kernels" + (f".{node.module}" if node.module else "") if node.level else str(node.module)
+            door = DOORS.get(source.removeprefix("warpflat."), {})
             for alias in node.names:
                 below = f"{source}.{alias.name}"
-                found.add(below if below in MODULES else source)
+                found.add(door.get(alias.name) or (below if below in MODULES else source))
     return {name for name in found if name.split(".")[0] == "warpflat"}
 
 
@@ -127,6 +145,32 @@ def test_a_room_imports_from_rooms_below_it(room: str) -> None:
     assert wrong == set()
 
 
+def test_a_layer_is_entered_by_its_door() -> None:
+    """What is above a layer imports names from its `__init__`, which has no others; the paper may enter `core` anywhere."""
+    used = {layer: set[str]() for layer in DOORS}
+    past = set()
+    for module, path in MODULES.items():
+        mine = module.split(".")[1] if "." in module else ""
+        for node in _nodes(path):
+            source = str(node.module).split(".") if isinstance(node, ast.ImportFrom) and not node.level else []
+            if source[:1] != ["warpflat"] or len(source) < 2 or source[1] not in DOORS:
+                continue
+            layer = source[1]
+            if mine in ("", "core", layer, "__main__") or (mine, layer) == ("flat", "core"):
+                continue
+            if len(source) > 2:
+                past.add(f"{module} imports from {'.'.join(source)}")
+            assert isinstance(node, ast.ImportFrom)
+            used[layer] |= {alias.name for alias in node.names}
+    assert past == set()
+    for name, layer in _named(PACKAGE / "__init__.pyi").items():
+        if layer in used:
+            used[layer].add(name)
+    assert {layer: set(door) for layer, door in DOORS.items()} == used
+    for layer, door in DOORS.items():
+        assert {name for name, module in door.items() if name not in _defined(MODULES[module])} == set(), layer
+
+
 def test_no_import_runs_in_a_circle() -> None:
     inner = {
         module: {name for name in _imports(module) if name in MODULES} for module in MODULES if module != "warpflat"
@@ -138,10 +182,12 @@ def test_no_import_runs_in_a_circle() -> None:
 
 
 def test_rooms_hold_no_second_path_to_a_name() -> None:
-    """The `__init__` of a room is its description, so that each name has one path."""
-    rooms = [path for path in PACKAGE.rglob("__init__.py") if path.parent not in (PACKAGE, KERNELS)]
+    """The `__init__` of a room is its description; names are at the doors of layers alone."""
+    doors = {PACKAGE, *(PACKAGE / layer for layer in DOORS)}
+    rooms = [path for path in PACKAGE.rglob("__init__.py") if path.parent not in (*doors, KERNELS)]
     filled = [str(path) for path in rooms if len(_body(path)) != 1]
     assert filled == []
+    assert {path.parent for path in PACKAGE.rglob("*.pyi")} == doors
     again = {
         f"{module}: {name}"
         for module, path in MODULES.items()

@@ -1,1 +1,5 @@
 """Garments: bodies and forms, sewing, finishing, seams that are found, draping."""
+
+from lazy_loader import attach_stub
+
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

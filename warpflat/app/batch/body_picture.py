@@ -9,8 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from warpflat.app.batch.body_statistics import BODY_GIRTHS, MEASURES, BodyPattern, fit_trend
-from warpflat.pattern.export.figure import new_figure, write_figure
-from warpflat.pattern.export.letters import all_letters
+from warpflat.pattern import all_letters, new_figure, write_figure
 
 __all__ = ["write_body_picture"]
 

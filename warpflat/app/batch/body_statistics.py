@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpflat.app.batch.task import AT_REST, NOT_AT_REST, Row
-from warpflat.core.input_files import read_result
-from warpflat.core.output import has_seal
+from warpflat.core import has_seal, read_result
 
 __all__ = [
     "BODY_GIRTHS",

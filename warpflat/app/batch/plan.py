@@ -17,11 +17,8 @@ from pydantic import Field, model_validator
 
 from warpflat._version import __version__
 from warpflat.app.scene.load import Scene, errors_named, expand_variables, make_scene
-from warpflat.core.errors import InputError
-from warpflat.core.input_files import file_digest
-from warpflat.core.text import plain_letters, quote_value
-from warpflat.core.toml_file import Table, check_table, read_toml
-from warpflat.garment.mannequin.table import MannequinTable
+from warpflat.core import InputError, Table, check_table, file_digest, plain_letters, quote_value, read_toml
+from warpflat.garment import MannequinTable
 
 __all__ = ["BatchTable", "BodyTable", "Task", "TaskTable", "load_batch"]
 

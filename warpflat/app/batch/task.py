@@ -15,10 +15,18 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.app.batch.plan import Task
-from warpflat.core.errors import InputError, is_number
-from warpflat.core.input_files import open_file, read_result
-from warpflat.core.output import NotOursError, output_folder, refuse_to_replace_others, remove_unfinished, write_sealed
-from warpflat.core.text import one_line
+from warpflat.core import (
+    InputError,
+    NotOursError,
+    is_number,
+    one_line,
+    open_file,
+    output_folder,
+    read_result,
+    refuse_to_replace_others,
+    remove_unfinished,
+    write_sealed,
+)
 
 __all__ = [
     "ERROR",

@@ -21,8 +21,7 @@ from distributed.system import MEMORY_LIMIT
 from warpflat._version import __version__
 from warpflat.app.batch.plan import Task
 from warpflat.app.batch.task import SET_ASIDE, Row, has_killed, run_task, set_aside
-from warpflat.core.errors import InputError
-from warpflat.core.text import control_in, quote_value
+from warpflat.core import InputError, control_in, quote_value
 
 __all__ = ["connect", "run_on_cluster", "run_on_workers"]
 
@@ -58,7 +57,7 @@ def run_on_workers(tasks: Sequence[Task], out: Path, count: int) -> Iterator[Row
     Raises:
         InputError: a result cannot be written.
     """
-    from warpflat.core.compile import compile_all_modules
+    from warpflat.core import compile_all_modules
 
     compile_all_modules()
     with (
@@ -170,8 +169,7 @@ def _work(task: Task, out: Path, version: str) -> Row:
         os.environ.setdefault(name, value)
     import warp
 
-    from warpflat.core.compile import start_warp
-    from warpflat.core.native_output import native_errors
+    from warpflat.core import native_errors, start_warp
 
     # Warp starts without its greeting; what it says on standard error is no error of the task.
     warp.config.log_level = warp.LOG_ERROR

@@ -54,8 +54,7 @@ def batch(file: Path, out: Path | None, workers: int, scheduler: str | None, qui
     from warpflat.app.batch.run import run_batch
     from warpflat.app.batch.task import NOT_AT_REST
     from warpflat.app.cli.run import start_warp_silently
-    from warpflat.core.errors import InputError
-    from warpflat.core.text import one_line
+    from warpflat.core import InputError, one_line
 
     tasks = load_batch(file)
     if find_spec("distributed") is None:

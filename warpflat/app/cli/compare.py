@@ -49,7 +49,7 @@ def compare(
     from warpflat.app.cli.tables import warnings_of
     from warpflat.app.scene.compare import compare_fabrics, compared_files, comparison_table, save_comparison
     from warpflat.app.scene.load import load_scene
-    from warpflat.core.output import output_folder
+    from warpflat.core import output_folder
 
     job = load_scene(scene)
     start_warp_silently()

@@ -10,7 +10,7 @@ import click
 
 from warpflat.app.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, ComputingCommand, output_options
 from warpflat.app.cli.run import report_run, start_warp_silently
-from warpflat.core.errors import InputError
+from warpflat.core import InputError
 
 __all__ = ["cuts"]
 
@@ -73,7 +73,7 @@ def cuts(
         # Edit a dart, and compare the garment before and after.
         from warpflat.app.cli.tables import edit_table
         from warpflat.app.scene.form_edits import edit_dart
-        from warpflat.core.output import output_folder, write_report
+        from warpflat.core import output_folder, write_report
 
         (how, (dart, aim)), *more = edits
         if more:
@@ -98,9 +98,8 @@ def cuts(
     from warpflat.app.cli.tables import ledger_table
     from warpflat.app.scene.ledger import cuts_of_entry, scene_ledger, with_cut
     from warpflat.app.scene.run import files_of_run, run_scene
-    from warpflat.core.output import optional_file, output_folder, write_report
-    from warpflat.core.toml_file import tables_as_toml
-    from warpflat.pattern.export.ledger_picture import write_ledger_picture
+    from warpflat.core import optional_file, output_folder, tables_as_toml, write_report
+    from warpflat.pattern import write_ledger_picture
 
     on_form = loaded.settings.mannequin is not None
     expected = ["ledger.json", "ledger.png", *(["cuts.toml"] if on_form else [])]
@@ -133,7 +132,7 @@ def cuts(
 
 
 def _write_toml(folder: Path, heading: str, tables: Sequence[str]) -> None:
-    from warpflat.core.output import atomic_path
+    from warpflat.core import atomic_path
 
     with atomic_path(folder / "cuts.toml") as temporary:
         temporary.write_text("\n".join([f"# {heading}\n", *tables]), encoding="utf-8")

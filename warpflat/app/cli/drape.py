@@ -83,7 +83,7 @@ def drape(
     from warpflat.app.scene.load import load_scene
     from warpflat.app.scene.outside_pattern import OutsideJob, drape_outside, edge_table, is_pattern_file
     from warpflat.app.scene.schema import DrapeTable
-    from warpflat.core.errors import InputError
+    from warpflat.core import InputError
 
     if is_pattern_file(scene):
         if edges:

@@ -32,8 +32,7 @@ def example(name: str | None, out: Path | None) -> int:
       warpflat example zip_dress
       warpflat run zip_dress.toml
     """
-    from warpflat.core.errors import InputError, nearest
-    from warpflat.core.output import atomic_path
+    from warpflat.core import InputError, atomic_path, nearest
 
     found = example_files()
     if name is None:

@@ -24,7 +24,7 @@ def fabrics(name: str | None, files: tuple[Path, ...], as_json: bool) -> None:
       warpflat fabrics --file my_fabrics.toml --json
     """
     from warpflat.app.cli.tables import fabric_data, fabric_sheet, fabric_table
-    from warpflat.flat.fabric.library import find_fabric, load_library
+    from warpflat.flat import find_fabric, load_library
 
     library = load_library(files)
     shown = list(library.values()) if name is None else [find_fabric(name, library)]

@@ -18,9 +18,7 @@ from warpflat.app.cli.options import (
     shear_limit_option,
 )
 from warpflat.app.cli.run import report_run, start_warp_silently
-from warpflat.core.errors import InputError
-from warpflat.core.file_names import make_file_name
-from warpflat.core.text import plain_letters, quote_value
+from warpflat.core import InputError, make_file_name, plain_letters, quote_value
 
 __all__ = ["fit"]
 

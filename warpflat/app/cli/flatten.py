@@ -18,8 +18,7 @@ from warpflat.app.cli.options import (
     shear_limit_option,
 )
 from warpflat.app.cli.run import run_and_report
-from warpflat.core.errors import InputError
-from warpflat.core.text import plain_letters, quote_value
+from warpflat.core import InputError, plain_letters, quote_value
 
 __all__ = ["drawn_seam", "flatten"]
 

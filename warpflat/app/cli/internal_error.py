@@ -8,7 +8,7 @@ import sys
 import traceback
 from collections.abc import Sequence
 
-from warpflat.core.text import one_line
+from warpflat.core import one_line
 
 __all__ = ["INTERNAL_ERROR", "report_internal_error"]
 

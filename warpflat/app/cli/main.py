@@ -32,12 +32,17 @@ from warpflat.app.cli.review import review
 from warpflat.app.cli.run import run
 from warpflat.app.cli.signals import INTERRUPTED, Stopped, signal_message, stop_on_signals
 from warpflat.app.cli.studio import studio
-from warpflat.core.errors import InputError, system_reason
-from warpflat.core.left_out import LeftOut, listening_to_left_out
-from warpflat.core.memory_limit import is_out_of_memory, memory_limit
-from warpflat.core.output import written_folders
-from warpflat.core.source_date import source_date
-from warpflat.core.text import one_line
+from warpflat.core import (
+    InputError,
+    LeftOut,
+    is_out_of_memory,
+    listening_to_left_out,
+    memory_limit,
+    one_line,
+    source_date,
+    system_reason,
+    written_folders,
+)
 
 __all__ = ["cli", "main"]
 

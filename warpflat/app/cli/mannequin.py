@@ -11,8 +11,7 @@ import click
 
 from warpflat.app.cli.options import DONE, ComputingCommand
 from warpflat.app.cli.run import start_warp_silently
-from warpflat.core.errors import InputError
-from warpflat.core.memory_limit import require_memory_for_usd
+from warpflat.core import InputError, require_memory_for_usd
 
 __all__ = ["mannequin", "read_lengths"]
 
@@ -58,10 +57,8 @@ def mannequin(
       warpflat mannequin --scan body.obj --units m --out body
     """
     from warpflat.app.cli.tables import mannequin_table, measures_table
-    from warpflat.core.output import output_folder
-    from warpflat.core.toml_file import check_table
-    from warpflat.garment.mannequin.output import MANNEQUIN_FILES, write_mannequin
-    from warpflat.garment.mannequin.table import MannequinTable, mannequin_from_table
+    from warpflat.core import check_table, output_folder
+    from warpflat.garment import MANNEQUIN_FILES, MannequinTable, mannequin_from_table, write_mannequin
 
     require_memory_for_usd()  # mannequin.usdc is always written
     tables: dict[str, Any] = {key: value for key, value in source.items() if value not in (None, False)}

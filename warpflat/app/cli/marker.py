@@ -116,10 +116,9 @@ def marker(
       warpflat marker out/shirt --repeat-warp 40 --repeat-weft 40 --match "side left"
       warpflat marker drawing.svg --one-way --seconds 60
     """
-    from warpflat.core.errors import InputError
-    from warpflat.garment.construction.pattern_files import lay_markers
-    from warpflat.pattern.drafting.marker import Cloth
-    from warpflat.pattern.drafting.matched_lay import Stripes
+    from warpflat.core import InputError
+    from warpflat.garment import lay_markers
+    from warpflat.pattern import Cloth, Stripes
 
     if seams and not (repeat_warp or repeat_weft):
         raise InputError("--match: needs the repeat of the stripes, --repeat-warp MM or --repeat-weft MM")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from warpflat.app.cli.options import DONE
-from warpflat.core.errors import InputError
+from warpflat.core import InputError
 
 if TYPE_CHECKING:
     from warpflat.app.scene.wardrobe import GarmentOffer
@@ -54,10 +54,9 @@ def new(
     """
     from warpflat.app.scene.style import STYLE_KEYS, style_options
     from warpflat.app.scene.wardrobe import garment_offer, offer_tables, offers, scene_text, style_of, taken_options
-    from warpflat.core.output import atomic_path
-    from warpflat.core.toml_file import check_table
-    from warpflat.flat.fabric.library import find_fabric, load_library
-    from warpflat.garment.mannequin.table import MannequinTable, mannequin_from_table
+    from warpflat.core import atomic_path, check_table
+    from warpflat.flat import find_fabric, load_library
+    from warpflat.garment import MannequinTable, mannequin_from_table
 
     name, chosen = _read_choices(words)
     if name is None:
@@ -79,7 +78,7 @@ def new(
         if out is not None or fabric is not None:
             raise InputError("--card draws a measurement card and writes no scene; leave out --out and --fabric")
         from warpflat.app.scene.style import covered_bands
-        from warpflat.garment.mannequin.card import needed_measurements, write_measurement_card
+        from warpflat.garment import needed_measurements, write_measurement_card
 
         table = _body_table(size, measures, scan, card)
         if card.exists() or card.is_symlink():

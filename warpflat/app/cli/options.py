@@ -8,8 +8,7 @@ from typing import Any
 
 import click
 
-from warpflat.core.environment import require_environment
-from warpflat.core.memory_limit import require_memory_for_libraries
+from warpflat.core import require_environment, require_memory_for_libraries
 
 __all__ = [
     "BAD_INPUT",
@@ -56,7 +55,7 @@ _VERBOSE = click.option(
 
 
 def _check_shear_limit(_: click.Context, __: click.Parameter, value: float | None) -> float | None:
-    from warpflat.flat.fabric.fabric import check_value
+    from warpflat.flat import check_value
 
     if value is not None:
         check_value("shear_limit", value, "--shear-limit")

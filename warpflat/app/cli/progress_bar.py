@@ -9,10 +9,10 @@ from contextlib import ExitStack
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from warpflat.core.activity import activity_listener
+from warpflat.core import activity_listener
 
 if TYPE_CHECKING:
-    from warpflat.flat.flattening.progress import Progress
+    from warpflat.flat import Progress
 
 __all__ = ["ProgressBar"]
 

@@ -60,7 +60,7 @@ def run_and_report(
     scene: Scene, out: Path | None, *, quiet: bool, verbose: bool, as_json: bool, device: str | None
 ) -> int:
     from warpflat.app.cli.progress_bar import ProgressBar
-    from warpflat.core.beside import Beside, work_beside
+    from warpflat.core import Beside, work_beside
 
     folder = out if out is not None else Path("out") / scene.name
     with ExitStack() as stack:
@@ -91,7 +91,7 @@ def start_warp_silently() -> None:
     """Start Warp without its greeting: standard output is for results, and a mistake is one line on standard error."""
     import warp
 
-    from warpflat.core.compile import start_warp
+    from warpflat.core import start_warp
 
     warp.config.log_level = warp.LOG_ERROR
     start_warp()
@@ -101,7 +101,7 @@ def report_run(result: SceneResult, folder: Path, *, quiet: bool, verbose: bool,
     """Print the result of a run, and return the exit code."""
     from warpflat.app.cli.summary import notes_line, summary_lines
     from warpflat.app.cli.tables import drape_lines, run_summary, warnings_of
-    from warpflat.flat.flattening.fit_report import fit_lines
+    from warpflat.flat import fit_lines
 
     warnings = warnings_of(result.metrics)
     if not (quiet or as_json):

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-from warpflat.core.errors import SIGNALS
+from warpflat.core import SIGNALS
 
 __all__ = [
     "INTERRUPTED",

@@ -62,7 +62,7 @@ def studio(
     """
     from warpflat.app.cli.run import start_warp_silently
     from warpflat.app.scene.load import load_scene, make_scene
-    from warpflat.core.errors import InputError
+    from warpflat.core import InputError
 
     if find_spec("viser") is None:
         raise InputError('the studio needs viser: pip install ".[studio]" in a checkout')
@@ -100,7 +100,7 @@ def scene_of_mesh(mesh: Path, *, units: str | None = None, fabric: str | None = 
     """
     from warpflat.app.scene.load import make_scene
     from warpflat.app.scene.surface import scene_surface
-    from warpflat.core.file_names import make_file_name
+    from warpflat.core import make_file_name
 
     tables: dict[str, Any] = {"surface": {"file": mesh.name}}
     if units is not None:

@@ -8,8 +8,8 @@ from typing import Any
 
 from warpflat.app.cli.tables import cut_words
 from warpflat.app.scene.found_seams import NO_PATTERN
-from warpflat.core.text import energy_words, format_count
-from warpflat.garment.construction.to_pattern import LACKING
+from warpflat.core import energy_words, format_count
+from warpflat.garment import LACKING
 
 __all__ = ["notes_line", "summary_lines"]
 

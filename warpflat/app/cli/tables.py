@@ -7,14 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
-from warpflat.core.text import energy_words, format_count
-from warpflat.flat.fabric.fabric import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_names
+from warpflat.core import energy_words, format_count
+from warpflat.flat import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_names
 
 if TYPE_CHECKING:
-    from warpflat.flat.cutting.ledger import Ledger
-    from warpflat.garment.mannequin.mannequin import Level
-    from warpflat.garment.mannequin.nearest_size import SizeDifference
-    from warpflat.garment.mannequin.scan_measures import ScanMeasure
+    from warpflat.flat import Ledger
+    from warpflat.garment import Level, ScanMeasure, SizeDifference
 
 __all__ = [
     "drape_lines",
@@ -68,7 +66,7 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
             )
         )
     tables = [_aligned(head, rows)]
-    from warpflat.flat.flattening.progress import relaxation_words
+    from warpflat.flat import relaxation_words
 
     if relaxed := relaxation_words(piece["stages"] for piece in metrics["pieces"].values()):
         tables.append(f"relaxed: {relaxed}")
@@ -117,7 +115,7 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
             )
         tables.append(f"girths [cm], body / form / pattern (ease): {'; '.join(parts)}")
     if metrics.get("rings"):
-        from warpflat.garment.construction.rings import rings_line
+        from warpflat.garment import rings_line
 
         tables.append(rings_line(metrics["rings"]))
     if len(metrics.get("cloths", ())) > 1:
@@ -269,7 +267,7 @@ def _more(of: Mapping[str, float], name: str) -> str:
 
 def ledger_table(ledger: Ledger) -> str:
     """Return the cuts of a ledger as text, best first, with the numbers that `--apply` takes."""
-    from warpflat.pattern.export.ledger_picture import candidate_words
+    from warpflat.pattern import candidate_words
 
     head = (
         "", "cut", "per cm", "released", "left", "length", "opening", "angle", "length error", "area error", "beyond the limit",

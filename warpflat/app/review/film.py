@@ -17,17 +17,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
-from warpflat.core.input_files import FARTHEST, reading
-from warpflat.core.sums import weighted_percentile
-from warpflat.core.usd_layers import check_layers
-from warpflat.core.usd_process import UNREADABLE, read_apart
-from warpflat.flat.surface.triangles import triangulate
-from warpflat.pattern.export.colours import VertexColours, energy_colours
-from warpflat.pattern.export.geometry import face_areas, outline_edges
-from warpflat.pattern.export.usd import DRAFTED
-from warpflat.pattern.export.usd_prims import part_path
+from warpflat.core import (
+    FARTHEST,
+    UNREADABLE,
+    FloatArray,
+    InputError,
+    IntArray,
+    check_layers,
+    read_apart,
+    reading,
+    weighted_percentile,
+)
+from warpflat.flat import triangulate
+from warpflat.pattern import DRAFTED, VertexColours, energy_colours, face_areas, outline_edges, part_path
 
 __all__ = ["MAPS", "FilmPiece", "Shape", "open_film", "pack_film", "pack_foreign_film"]
 

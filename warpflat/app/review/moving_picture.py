@@ -11,15 +11,9 @@ import numpy as np
 
 from warpflat.app.review.film import FilmPiece, open_film
 from warpflat.app.review.page import read_run
-from warpflat.core.arrays import IntArray
-from warpflat.core.errors import InputError
-from warpflat.core.input_files import reading
-from warpflat.core.output import atomic_path, output_folder, record_file
-from warpflat.flat.surface.triangles import triangulate
-from warpflat.pattern.export.colours import SMALLEST_SCALE, energy_colours
-from warpflat.pattern.export.figure import write_moving_picture
-from warpflat.pattern.export.geometry import outline_edges
-from warpflat.pattern.export.raster import rasterise, shade
+from warpflat.core import InputError, IntArray, atomic_path, output_folder, reading, record_file
+from warpflat.flat import triangulate
+from warpflat.pattern import SMALLEST_SCALE, energy_colours, outline_edges, rasterise, shade, write_moving_picture
 
 if TYPE_CHECKING:
     from PIL import Image

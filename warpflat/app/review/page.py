@@ -16,12 +16,19 @@ from typing import Any
 from urllib.parse import quote
 
 from warpflat.app.review.film import open_film, pack_film, pack_foreign_film
-from warpflat.core.activity import report_activity
-from warpflat.core.errors import InputError
-from warpflat.core.input_files import guarded, open_file, read_result
-from warpflat.core.output import atomic_path, latest_file, recorded_files
-from warpflat.core.text import energy_words, format_count
-from warpflat.pattern.export.colours import SMALLEST_SCALE
+from warpflat.core import (
+    InputError,
+    atomic_path,
+    energy_words,
+    format_count,
+    guarded,
+    latest_file,
+    open_file,
+    read_result,
+    recorded_files,
+    report_activity,
+)
+from warpflat.pattern import SMALLEST_SCALE
 
 __all__ = ["pack_frames", "pack_pictures", "read_run", "review_folder", "write_review"]
 
@@ -68,7 +75,7 @@ def review_folder(folder: str | Path) -> Path:
     Raises:
         InputError: the folder holds no run, a file of it cannot be read, or the page cannot be written.
     """
-    from warpflat.core.output import output_folder, record_file
+    from warpflat.core import output_folder, record_file
 
     folder = Path(folder)
     metrics, files, name = read_run(folder)

@@ -6,11 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from warpflat.core.errors import InputError
-from warpflat.flat.surface.io.read import read_scan
-from warpflat.garment.mannequin.body_model import finer_body
-from warpflat.garment.mannequin.common_body import common_body_of_scan
-from warpflat.garment.mannequin.slicer import Slicer
+from warpflat.core import InputError
+from warpflat.flat import read_scan
+from warpflat.garment import Slicer, common_body_of_scan, finer_body
 
 __all__ = ["waist_of_body"]
 

@@ -14,13 +14,9 @@ from warpflat.app.scene.drape import drape_scene
 from warpflat.app.scene.form_shaping import settle_shape
 from warpflat.app.scene.load import Scene, scene_fabric
 from warpflat.app.scene.plan import MeshPlan, plan_scene
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.flat.cutting.remedies import advise
-from warpflat.flat.flattening.fit_report import STRAINS
-from warpflat.flat.flattening.progress import Progress
-from warpflat.flat.flattening.verdict import judge
-from warpflat.garment.construction.garment import Garment
+from warpflat.core import FloatArray, InputError
+from warpflat.flat import STRAINS, Progress, advise, judge
+from warpflat.garment import Garment
 
 __all__ = ["compare_fabrics", "compared_files", "comparison_table", "laid_upon", "save_comparison"]
 
@@ -102,8 +98,8 @@ def save_comparison(comparison: Comparison, folder: str | Path) -> list[str]:
         InputError: the folder cannot be written, or a surface was read from a file there that would be replaced.
     """
     from warpflat.app.scene.compare_picture import write_overlay_picture, write_overlay_svg
-    from warpflat.core.output import optional_file, output_folder, write_report
-    from warpflat.garment.draping.picture import write_compared_drapes
+    from warpflat.core import optional_file, output_folder, write_report
+    from warpflat.garment import write_compared_drapes
 
     sources = [
         file for pieces in comparison.results.values() for piece in pieces.values() for file in piece.surface.sources

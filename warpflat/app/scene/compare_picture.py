@@ -10,10 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from warpflat.app.scene.comparison import Comparison, outline
-from warpflat.core.output import atomic_path
-from warpflat.flat.surface.connectivity import border_loops
-from warpflat.pattern.export.figure import new_figure
-from warpflat.pattern.export.letters import all_letters
+from warpflat.core import atomic_path
+from warpflat.flat import border_loops
+from warpflat.pattern import all_letters, new_figure
 
 __all__ = ["write_overlay_picture", "write_overlay_svg"]
 

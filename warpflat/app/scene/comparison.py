@@ -10,13 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat._version import __version__
-from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import polyline_length
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.surface.connectivity import border_loops
+from warpflat.core import FloatArray, polyline_length
+from warpflat.flat import Flattening, border_loops
 
 if TYPE_CHECKING:
-    from warpflat.garment.draping.result import Drape
+    from warpflat.garment import Drape
 
 __all__ = ["Comparison", "outline"]
 

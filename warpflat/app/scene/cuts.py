@@ -8,20 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from warpflat.app.scene.load import Scene, errors_named, make_scene
 from warpflat.app.scene.schema import AutoCutTable, CutTable
-from warpflat.core.arrays import IntArray
-from warpflat.core.errors import InputError
-from warpflat.core.text import find_unused_name, quote_value
-from warpflat.garment.mannequin.darts import FormDart
-from warpflat.garment.mannequin.forms import Form
-from warpflat.garment.mannequin.mannequin import Mannequin
-from warpflat.garment.mannequin.part_pieces import part_pieces, taken_over
+from warpflat.core import InputError, IntArray, find_unused_name, quote_value
+from warpflat.garment import Form, FormDart, Mannequin, part_pieces, taken_over
 
 if TYPE_CHECKING:
-    from warpflat.flat.cutting.cut_plan import CutPlan
-    from warpflat.flat.cutting.ledger import AutoCut
-    from warpflat.flat.flattening.result import Flattening
-    from warpflat.flat.solver.options import RelaxOptions
-    from warpflat.flat.surface.mesh import Surface
+    from warpflat.flat import AutoCut, CutPlan, Flattening, RelaxOptions, Surface
 
 __all__ = [
     "CutSequence",
@@ -71,14 +62,21 @@ def plan_cuts(surface: Surface, tables: Sequence[CutTable]) -> CutSequence:
     Raises:
         InputError: a line that does not exist, a path that leaves the surface or crosses itself; begins with the table.
     """
-    from warpflat.flat.cutting.cut_plan import CutPlan, draw_line, line_part
-    from warpflat.flat.cutting.open_tube import open_with_cuts, without_overlaps
-    from warpflat.flat.surface.connectivity import border_loops
-    from warpflat.flat.surface.cut.dart_legs import check_tip_back
-    from warpflat.flat.surface.paths.edge_paths import as_vertex, path_length
-    from warpflat.flat.surface.paths.section import plane_path, plane_section
-    from warpflat.flat.surface.paths.trace import polyline_path
-    from warpflat.flat.surface.tubes import tube_borders
+    from warpflat.flat import (
+        CutPlan,
+        as_vertex,
+        border_loops,
+        check_tip_back,
+        draw_line,
+        line_part,
+        open_with_cuts,
+        path_length,
+        plane_path,
+        plane_section,
+        polyline_path,
+        tube_borders,
+        without_overlaps,
+    )
 
     names = [table.name or table.line or f"cut {number + 1}" for number, table in enumerate(tables)]
     drawn: dict[int, str] = {}
@@ -154,10 +152,8 @@ def plan_automatic_cuts(
     Raises:
         InputError: a cut that is made before is refused.
     """
-    from warpflat.core.errors import InputError
-    from warpflat.flat.cutting.cut_plan import CutPlan
-    from warpflat.flat.cutting.ledger import AutoCut, cut_automatically
-    from warpflat.flat.solver.options import coarse_options
+    from warpflat.core import InputError
+    from warpflat.flat import AutoCut, CutPlan, coarse_options, cut_automatically
 
     auto = AutoCut(**table.model_dump())
     # Energies are a little higher while the relaxation is coarse: whether a cut is needed is for the full one to say.
@@ -180,7 +176,7 @@ def flatten_and_cut(
     sequence: CutSequence, *, flatten: Callable[[Surface, RelaxOptions], Flattening], relax: RelaxOptions
 ) -> Flattening:
     """Flatten a piece and make all cuts of a sequence."""
-    from warpflat.flat.cutting.cut_piece import cut
+    from warpflat.flat import cut
 
     result = flatten(sequence.surface, relax)
     for plan in sequence.plans:

@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 from warpflat.app.scene.frames import FrameSchedule
 from warpflat.app.scene.load import Scene, errors_named
 from warpflat.app.scene.schema import DrapeTable
-from warpflat.core.activity import report_activity
-from warpflat.garment.construction.garment import Garment
-from warpflat.garment.construction.pattern_files import garment_files, pattern_names
+from warpflat.core import report_activity
+from warpflat.garment import Garment, garment_files, pattern_names
 
 if TYPE_CHECKING:
-    from warpflat.flat.flattening.result import Flattening
-    from warpflat.garment.draping.result import Drape
+    from warpflat.flat import Flattening
+    from warpflat.garment import Drape
 
 __all__ = ["drape_names", "drape_scene", "write_drape"]
 
@@ -57,7 +56,7 @@ def write_drape(
     Raises:
         InputError: an unknown line, or the folder cannot be written.
     """
-    from warpflat.garment.draping.write import write_drape_files
+    from warpflat.garment import write_drape_files
 
     draped = drape_scene(scene, garment, device=device)
     output = scene.settings.output
@@ -70,9 +69,9 @@ def write_drape(
     if table.correct or table.correct_fabric is not None:
         # Correct the pattern, and write it beside the first.
         from warpflat.app.scene.pattern_options import pattern_options
-        from warpflat.core.output import optional_file
-        from warpflat.flat.fabric.library import find_fabric
-        from warpflat.garment.draping.correct_pattern import correct_pattern
+        from warpflat.core import optional_file
+        from warpflat.flat import find_fabric
+        from warpflat.garment import correct_pattern
 
         report_activity("correcting the pattern")
         with errors_named(scene.where):
@@ -83,7 +82,7 @@ def write_drape(
             drawing = pattern_options(scene.settings.pattern, None)
         if output.picture:
             with optional_file(folder / "corrected.png", files) as path:
-                from warpflat.garment.draping.correction_picture import write_correction_picture
+                from warpflat.garment import write_correction_picture
 
                 write_correction_picture(path, found)
         corrected = found.apply(garment)
@@ -106,8 +105,7 @@ def drape_scene(scene: Scene, garment: Garment | Flattening, *, device: str | No
     Raises:
         InputError: an unknown line, or half pieces.
     """
-    from warpflat.garment.draping.drape_garment import drape
-    from warpflat.garment.draping.options import DrapeOptions
+    from warpflat.garment import DrapeOptions, drape
 
     table = scene.settings.drape or DrapeTable()
     report_activity("draping")

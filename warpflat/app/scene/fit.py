@@ -16,19 +16,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.app.scene.load import Scene, make_scene, scene_fabric
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError, is_number, nearest
-from warpflat.core.file_names import make_file_name, make_piece_name
-from warpflat.core.input_files import listening_to_reads
-from warpflat.core.text import quote_value
-from warpflat.garment.construction.level_ease import EASE_LEVELS
+from warpflat.core import (
+    FloatArray,
+    InputError,
+    is_number,
+    listening_to_reads,
+    make_file_name,
+    make_piece_name,
+    nearest,
+    quote_value,
+)
+from warpflat.garment import EASE_LEVELS
 
 if TYPE_CHECKING:
     from warpflat.app.scene.run import SceneResult
-    from warpflat.flat.surface.io.read import RawMesh
-    from warpflat.flat.surface.io.sewn_panels import SewnPanel
-    from warpflat.garment.mannequin.common_body import CommonBody
-    from warpflat.garment.seams.layers import GarmentFile
+    from warpflat.flat import RawMesh, SewnPanel
+    from warpflat.garment import CommonBody, GarmentFile
 
 __all__ = [
     "Carried",
@@ -161,10 +164,8 @@ class FitJob:
         Raises:
             InputError: a file cannot be read, is no body, or does not lie in the garment.
         """
-        from warpflat.flat.surface.triangles import triangulate
-        from warpflat.garment.mannequin.common_body import common_body_inside, skin_triangles
-        from warpflat.garment.mannequin.fit_body import Mesh
-        from warpflat.garment.seams.layers import read_garment
+        from warpflat.flat import triangulate
+        from warpflat.garment import Mesh, common_body_inside, read_garment, skin_triangles
 
         if front is not None and front not in _FRONTS:
             raise InputError(f"--front {quote_value(front)}: {nearest(front, _FRONTS)}")
@@ -222,10 +223,7 @@ class FitJob:
         """
         from scipy.spatial import cKDTree
 
-        from warpflat.garment.construction.carry import carry
-        from warpflat.garment.construction.level_ease import level_ease, widened
-        from warpflat.garment.mannequin.common_body import skin_triangles
-        from warpflat.garment.mannequin.fit_body import Mesh
+        from warpflat.garment import Mesh, carry, level_ease, skin_triangles, widened
 
         posed = _common_body(body, "--to", keep_pose=keep_pose)
         wearer = posed.in_pose_of(self.body)
@@ -298,9 +296,8 @@ class FitJob:
         """
         from scipy.spatial import cKDTree
 
-        from warpflat.flat.surface.paths.section import plane_sections
-        from warpflat.flat.surface.triangles import triangulate
-        from warpflat.garment.mannequin.closest import Closest
+        from warpflat.flat import plane_sections, triangulate
+        from warpflat.garment import Closest
 
         layers = self.read.layers
         now = [
@@ -357,8 +354,7 @@ def _known_pattern(read: GarmentFile, name: str) -> list[SewnPanel]:
     A texture in millimetres or centimetres has been measured. One that fits in another unit may be a normalised one by chance: it must lay
     the cloth nearly as it is worn.
     """
-    from warpflat.flat.flattening.graded import stretches_worn
-    from warpflat.flat.surface.io.sewn_panels import sewn_panels
+    from warpflat.flat import sewn_panels, stretches_worn
 
     try:
         panels = sewn_panels(read.raw, read.scale, name=make_piece_name(name))
@@ -435,10 +431,9 @@ def fit_to(
         InputError: the garment cannot be flattened, or `out` cannot be written.
     """
     from warpflat.app.scene.run import files_of_run, run_scene
-    from warpflat.core.output import atomic_path, output_folder, record_file
-    from warpflat.flat.flattening.graded import graded_layout
-    from warpflat.flat.surface.io.sewn_panels import with_cuts
-    from warpflat.garment.mannequin.body_model import finer_body
+    from warpflat.core import atomic_path, output_folder, record_file
+    from warpflat.flat import graded_layout, with_cuts
+    from warpflat.garment import finer_body
 
     known, raw = job.panels if job.keeps_pattern(tables) else [], job.read.raw
     if known:
@@ -538,7 +533,7 @@ def write_study(folder: Path, fitted: Sequence[Fitted]) -> list[str]:
         InputError: they cannot be written.
     """
     from warpflat._version import __version__
-    from warpflat.core.output import atomic_path, write_json
+    from warpflat.core import atomic_path, write_json
 
     entries = [
         {**each.carried.as_dict(), "folder": str(each.folder), "fits": each.fits, "done": each.converged}
@@ -574,10 +569,8 @@ def study_table(fitted: Sequence[Fitted]) -> list[str]:
 @lru_cache(maxsize=4)
 def _common_body(text: str, option: str, *, keep_pose: bool = False) -> CommonBody:
     """Return the body of a size, or of a scan's file, which may sit if its pose is to be kept."""
-    from warpflat.flat.surface.io.read import read_scan
-    from warpflat.garment.mannequin.common_body import common_body_of_mannequin, common_body_of_scan
-    from warpflat.garment.mannequin.mannequin import Mannequin
-    from warpflat.garment.mannequin.scan_pose import ScanOptions
+    from warpflat.flat import read_scan
+    from warpflat.garment import Mannequin, ScanOptions, common_body_of_mannequin, common_body_of_scan
 
     if not Path(text).suffix:
         if keep_pose:

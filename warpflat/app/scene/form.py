@@ -8,12 +8,17 @@ from warpflat.app.scene.cuts import cut_form
 from warpflat.app.scene.load import Scene, errors_named, expand_variables, scene_fabric
 from warpflat.app.scene.openings import scene_finishing, scene_openings
 from warpflat.app.scene.pulled_on import wide_enough
-from warpflat.garment.construction.openings import part_at_centres
-from warpflat.garment.mannequin.ease import ease_from
-from warpflat.garment.mannequin.forms import Form, FormResult, form_from_mapping, shipped_form
-from warpflat.garment.mannequin.mannequin import Mannequin
-from warpflat.garment.mannequin.shapes import shaped_form
-from warpflat.garment.mannequin.table import mannequin_from_table
+from warpflat.garment import (
+    Form,
+    FormResult,
+    Mannequin,
+    ease_from,
+    form_from_mapping,
+    mannequin_from_table,
+    part_at_centres,
+    shaped_form,
+    shipped_form,
+)
 
 __all__ = ["scene_form", "scene_recipe"]
 

@@ -14,12 +14,8 @@ from warpflat.app.scene.form import scene_form, scene_recipe
 from warpflat.app.scene.form_shaping import settle_shape
 from warpflat.app.scene.load import Scene
 from warpflat.app.scene.plan import plan_garment
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.polyline import polyline_length
-from warpflat.core.toml_file import tables_as_toml
-from warpflat.garment.construction.form_garment import FormGarment
-from warpflat.garment.construction.form_plan import plan_form
-from warpflat.garment.mannequin.darts import FormDart
+from warpflat.core import InputError, nearest, polyline_length, tables_as_toml
+from warpflat.garment import FormDart, FormGarment, plan_form
 
 __all__ = ["KINDS", "DartEdit", "edit_dart", "rotate_dart", "split_dart", "turn_dart"]
 

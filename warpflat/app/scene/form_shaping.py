@@ -10,14 +10,19 @@ from warpflat.app.scene.cuts import place_of, scene_with
 from warpflat.app.scene.form import scene_recipe
 from warpflat.app.scene.ledger import candidate_cuts, trial_of_scene, try_cuts, with_cut
 from warpflat.app.scene.load import Scene
-from warpflat.flat.cutting.ledger import AutoCut, LedgerEntry, RankedBy
-from warpflat.flat.flattening.result import Flattening
-from warpflat.garment.construction.darts import NEAR_ARMHOLE, closed_darts, crowded_darts
-from warpflat.garment.construction.form_garment import FormGarment
-from warpflat.garment.construction.garment import Garment
-from warpflat.garment.mannequin.bricks import select_bricks
-from warpflat.garment.mannequin.darts import FormDart, place_darts, usual_darts
-from warpflat.garment.mannequin.elbow_darts import ELBOW
+from warpflat.flat import AutoCut, Flattening, LedgerEntry, RankedBy
+from warpflat.garment import (
+    ELBOW,
+    NEAR_ARMHOLE,
+    FormDart,
+    FormGarment,
+    Garment,
+    closed_darts,
+    crowded_darts,
+    place_darts,
+    select_bricks,
+    usual_darts,
+)
 
 __all__ = ["ClosedDarts", "require_open_darts", "settle_shape", "without_closed_darts"]
 

@@ -16,25 +16,26 @@ from warpflat.app.scene.frames import FrameSchedule
 from warpflat.app.scene.load import Scene, errors_named, expand_variables, scene_fabric
 from warpflat.app.scene.schema import FileSurface, SeamCutTable
 from warpflat.app.scene.surface import scene_surface
-from warpflat.core.errors import InputError, is_number, nearest
-from warpflat.core.file_names import make_piece_name
-from warpflat.core.input_files import check_values, reading
-from warpflat.core.memory_limit import require_memory_for_run
-from warpflat.core.text import find_unused_name, format_count, quote_value
-from warpflat.flat.surface.half_edges import half_edges
-from warpflat.flat.surface.repair.weld import weld_map
+from warpflat.core import (
+    InputError,
+    check_values,
+    find_unused_name,
+    format_count,
+    is_number,
+    make_piece_name,
+    nearest,
+    quote_value,
+    reading,
+    require_memory_for_run,
+)
+from warpflat.flat import half_edges, weld_map
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from warpflat.flat.fabric.fabric import Fabric
-    from warpflat.flat.flattening.result import Flattening
-    from warpflat.flat.surface.io.file_seams import FileSeams
-    from warpflat.flat.surface.mesh import Surface
-    from warpflat.garment.seams.find import FoundSeams
-    from warpflat.garment.seams.layers import GarmentFile
-    from warpflat.garment.seams.options import SeamCut
-    from warpflat.pattern.drafting.piece_parts import FoundSeam
+    from warpflat.flat import Fabric, FileSeams, Flattening, Surface
+    from warpflat.garment import FoundSeams, GarmentFile, SeamCut
+    from warpflat.pattern import FoundSeam
 
 __all__ = ["NO_PATTERN", "found_seams", "plain_panel", "read_edges", "seams_entry"]
 
@@ -57,11 +58,8 @@ def found_seams(scene: Scene) -> FoundSeams | None:
         InputError: the file is wrong.
     """
     from warpflat.app.scene.body_waist import waist_of_body
-    from warpflat.flat.surface.io.file_seams import FILE_SEAMS, MOST_ISLANDS, file_seams, like_cut_pieces
-    from warpflat.flat.surface.io.read_pieces import object_parts
-    from warpflat.garment.seams.find import find_seams
-    from warpflat.garment.seams.layers import read_garment
-    from warpflat.garment.seams.options import SeamOptions
+    from warpflat.flat import FILE_SEAMS, MOST_ISLANDS, file_seams, like_cut_pieces, object_parts
+    from warpflat.garment import SeamOptions, find_seams, read_garment
 
     settings, table = scene.settings, scene.settings.surface
     asked, drawn = settings.find_seams, settings.seams_cut
@@ -193,9 +191,8 @@ def found_seams(scene: Scene) -> FoundSeams | None:
 
 def _beyond_limit(pieces: Sequence[Surface], fabric: Fabric) -> float:
     """Return the share of the cloth that is beyond its limit where pieces are laid flat, about."""
-    from warpflat.flat.surface.normals import area_vectors
-    from warpflat.flat.surface.triangles import triangulate
-    from warpflat.garment.seams.energy import laid_flat
+    from warpflat.flat import area_vectors, triangulate
+    from warpflat.garment import laid_flat
 
     vectors = [area_vectors(piece.vertices, triangulate(piece.faces)[0]) for piece in pieces]
     area = [float(np.linalg.norm(each, axis=1).sum()) for each in vectors]
@@ -204,7 +201,7 @@ def _beyond_limit(pieces: Sequence[Surface], fabric: Fabric) -> float:
 
 def _knit_for(pieces: Sequence[Surface], fabric: Fabric) -> str:
     """Return the name of the knit that gives the least of those in which pieces are a pattern; "" if there is none."""
-    from warpflat.flat.fabric.library import load_library
+    from warpflat.flat import load_library
 
     knits = [knit for knit in load_library().values() if knit.is_knit and knit.strain_limit > fabric.strain_limit]
     for knit in sorted(knits, key=lambda one: one.strain_limit):
@@ -218,7 +215,7 @@ def _cuts_of_file(seams: FileSeams, read: GarmentFile, layers: Sequence[Surface]
 
     What ran along an inner shell, or to it across a thickness, is gone with that, or lies on the border.
     """
-    from warpflat.garment.seams.options import SeamCut
+    from warpflat.garment import SeamCut
 
     place = weld_map(read.raw.vertices).astype(np.int64)
 
@@ -312,7 +309,7 @@ def _as_cuts(scene: Scene, number: int, table: SeamCutTable, marks: Sequence[Sea
     Raises:
         InputError: a line or a file is missing, or the file holds no rows of vertices.
     """
-    from warpflat.garment.seams.options import SeamCut
+    from warpflat.garment import SeamCut
 
     where = f"seams_cut[{number}]"
     here = f"{scene.where}: {where}"
@@ -391,8 +388,7 @@ def plain_panel(scene: Scene) -> Surface | None:
 
     A file whose texture has several islands may bring its seams.
     """
-    from warpflat.flat.surface.io.file_seams import file_seams
-    from warpflat.flat.surface.io.read import read_mesh_file
+    from warpflat.flat import file_seams, read_mesh_file
 
     settings, table = scene.settings, scene.settings.surface
     if not isinstance(table, FileSurface) or table.component is not None or settings.find_seams or settings.seams_cut:
@@ -410,11 +406,8 @@ def plain_panel(scene: Scene) -> Surface | None:
 
 def _is_whole_garment(surface: Surface) -> bool:
     """Return whether a surface cannot lie flat in one piece: closed, with handles, forked, a cap, or a cone with its tip cut off."""
-    from warpflat.flat.surface.connectivity import border_loops, euler_characteristic
-    from warpflat.flat.surface.triangles import triangulate
-    from warpflat.flat.surface.tubes import inner_borders
-    from warpflat.garment.seams.cloth import Cloth
-    from warpflat.garment.seams.solid import is_panel, wide_borders
+    from warpflat.flat import border_loops, euler_characteristic, inner_borders, triangulate
+    from warpflat.garment import Cloth, is_panel, wide_borders
 
     if len(surface.faces) < _FEWEST:
         return False
@@ -436,7 +429,7 @@ def seams_entry(found: FoundSeams, pieces: Sequence[Flattening], allowance: floa
         pieces: flat.
         allowance: of seams [m].
     """
-    from warpflat.garment.seams.solid import parts_within
+    from warpflat.garment import parts_within
 
     area = np.array([float(piece.fit.area.sum()) for piece in pieces])
     outside = np.array([piece.fit.outside for piece in pieces])

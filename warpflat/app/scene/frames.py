@@ -18,19 +18,13 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.app.scene.schema import OutputTable
-from warpflat.core.activity import report_activity
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import CannotWriteError, system_reason
-from warpflat.core.output import optional_file
-from warpflat.flat.surface.half_edges import half_edges
-from warpflat.flat.surface.mesh import Surface
-from warpflat.pattern.export.geometry import Polylines, corner_mean
+from warpflat.core import CannotWriteError, FloatArray, IntArray, optional_file, report_activity, system_reason
+from warpflat.flat import Surface, half_edges
+from warpflat.pattern import Polylines, corner_mean
 
 if TYPE_CHECKING:
-    from warpflat.flat.cutting.cut_plan import CutPlan
-    from warpflat.flat.flattening.progress import Progress
-    from warpflat.flat.flattening.result import Flattening
-    from warpflat.garment.mannequin.mannequin import Mannequin
+    from warpflat.flat import CutPlan, Flattening, Progress
+    from warpflat.garment import Mannequin
 
 __all__ = ["MANNEQUIN", "Film", "FilmStage", "FrameRecorder", "FrameSchedule", "KeyFile", "path_in_pattern"]
 
@@ -331,8 +325,7 @@ class Film:
         if kind is not None or self._keys.failed:
             return
         with optional_file(self._folder / "frames.usdc", self.files) as path:
-            from warpflat.pattern.export.colours import SMALLEST_SCALE
-            from warpflat.pattern.export.usd import FrameWriter, film_scale
+            from warpflat.pattern import SMALLEST_SCALE, FrameWriter, film_scale
 
             report_activity("writing the film")
             # The upper end of the colours: by the last frames, or by the first ones if the pieces end without strain.
@@ -345,9 +338,8 @@ class Film:
                     break
             with FrameWriter(path, scale=scale) as writer:
                 if self._mannequin is not None:
-                    from warpflat.flat.surface.normals import vertex_normals
-                    from warpflat.garment.draping.body import Body
-                    from warpflat.garment.mannequin.usd import write_mannequin_usd
+                    from warpflat.flat import vertex_normals
+                    from warpflat.garment import Body, write_mannequin_usd
 
                     write_mannequin_usd(self._mannequin, self._folder / MANNEQUIN)
                     layout = self._mannequin.layout

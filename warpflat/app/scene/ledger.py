@@ -11,19 +11,30 @@ from warpflat.app.scene.cuts import CutSequence, cut_of_dart, cuts_beside, flatt
 from warpflat.app.scene.form import scene_form, scene_recipe
 from warpflat.app.scene.load import Scene, errors_named, scene_relax_options
 from warpflat.app.scene.plan import GarmentPlan, flatten_surface, plan_garment, scene_cuts
-from warpflat.core.errors import InputError
-from warpflat.flat.cutting.candidates import Peaks, find_candidates, find_peaks
-from warpflat.flat.cutting.cut_plan import CutPlan
-from warpflat.flat.cutting.ledger import Ledger, LedgerEntry, RankedBy, make_ledger, try_all
-from warpflat.flat.solver.options import coarse_options
-from warpflat.garment.construction.form_garment import flatten_form
-from warpflat.garment.construction.garment import Garment
-from warpflat.garment.mannequin.bricks import select_bricks
-from warpflat.garment.mannequin.darts import dart_along, usual_darts
-from warpflat.garment.mannequin.forms import Form
-from warpflat.garment.mannequin.halves import is_side
-from warpflat.garment.mannequin.mannequin import Mannequin
-from warpflat.garment.mannequin.part_pieces import princess_seams
+from warpflat.core import InputError
+from warpflat.flat import (
+    CutPlan,
+    Ledger,
+    LedgerEntry,
+    Peaks,
+    RankedBy,
+    coarse_options,
+    find_candidates,
+    find_peaks,
+    make_ledger,
+    try_all,
+)
+from warpflat.garment import (
+    Form,
+    Garment,
+    Mannequin,
+    dart_along,
+    flatten_form,
+    is_side,
+    princess_seams,
+    select_bricks,
+    usual_darts,
+)
 
 __all__ = ["FormTrial", "candidate_cuts", "cuts_of_entry", "scene_ledger", "trial_of_scene", "try_cuts", "with_cut"]
 

@@ -10,16 +10,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.file_names import check_file_name, make_file_name
-from warpflat.core.toml_file import check_table, read_toml
-from warpflat.flat.fabric.fabric import Fabric
-from warpflat.flat.fabric.file import FabricTable, fabric_from_table
-from warpflat.flat.fabric.library import find_fabric, load_library
-from warpflat.flat.solver.options import RelaxOptions
+from warpflat.core import InputError, check_file_name, check_table, make_file_name, nearest, read_toml
+from warpflat.flat import Fabric, FabricTable, RelaxOptions, fabric_from_table, find_fabric, load_library
 
 if TYPE_CHECKING:
-    from warpflat.flat.model.wear import Wear
+    from warpflat.flat import Wear
 from warpflat.app.scene.schema import SceneTable
 
 __all__ = [
@@ -130,7 +125,7 @@ def scene_wear(scene: Scene) -> Wear | None:
     Raises:
         InputError: a value out of its bounds.
     """
-    from warpflat.flat.model.wear import Wear
+    from warpflat.flat import Wear
 
     if scene.settings.wear is None:
         return None

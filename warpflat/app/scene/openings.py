@@ -8,15 +8,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from warpflat.app.scene.schema import FinishingTable, PocketTable, SceneTable
-from warpflat.garment.construction.collars import COLLARS, Collar
-from warpflat.garment.construction.edge_rules import EdgeRules
-from warpflat.garment.construction.finishing import FINISHES, Finishing
-from warpflat.garment.construction.openings import CENTRES, Buttons, Opening
-from warpflat.garment.construction.pockets import Pocket
+from warpflat.garment import CENTRES, COLLARS, FINISHES, Buttons, Collar, EdgeRules, Finishing, Opening, Pocket
 
 if TYPE_CHECKING:
-    from warpflat.garment.construction.constraints import Constraint
-    from warpflat.garment.mannequin.forms import FormResult
+    from warpflat.garment import Constraint, FormResult
 
 __all__ = ["scene_finishing", "scene_openings", "scene_pockets", "sewn_centres", "straight_stands"]
 
@@ -53,7 +48,7 @@ def scene_openings(settings: SceneTable) -> list[Opening]:
 
 def straight_stands(form: FormResult, openings: Sequence[Opening]) -> list[Constraint]:
     """Return the constraints that lay the edges of button stands and wraps straight along the grain; a fold is so anyway."""
-    from warpflat.garment.construction.constraints import Straight  # loads the solver
+    from warpflat.garment import Straight
 
     return [
         Straight(piece=name, line=opening.line, along="warp")

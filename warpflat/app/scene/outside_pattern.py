@@ -13,18 +13,12 @@ from pydantic import BaseModel, Field
 from warpflat.app.scene.load import errors_named, expand_variables
 from warpflat.app.scene.run import SceneResult
 from warpflat.app.scene.schema import DrapeTable
-from warpflat.core.errors import InputError
-from warpflat.core.file_names import make_file_name
-from warpflat.core.input_files import read_json
-from warpflat.core.text import format_count
-from warpflat.core.toml_file import Table, check_table, read_toml
-from warpflat.garment.mannequin.table import MannequinTable, mannequin_from_table
+from warpflat.core import InputError, Table, check_table, format_count, make_file_name, read_json, read_toml
+from warpflat.garment import MannequinTable, mannequin_from_table
 
 if TYPE_CHECKING:
-    from warpflat.garment.draping.correct_pattern import Correction
-    from warpflat.garment.draping.lift import Lift
-    from warpflat.garment.mannequin.mannequin import Mannequin
-    from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam
+    from warpflat.garment import Correction, Lift, Mannequin
+    from warpflat.pattern import Pattern, Piece, Seam
 
 __all__ = ["OutsideJob", "SewingTable", "drape_outside", "edge_table", "is_pattern_file"]
 
@@ -130,8 +124,8 @@ class OutsideJob:
         Raises:
             InputError: a file cannot be read, a name is unknown, or there is no seam or no body.
         """
-        from warpflat.core.input_files import listening_to_reads
-        from warpflat.pattern.drafting.pieces import Seam
+        from warpflat.core import listening_to_reads
+        from warpflat.pattern import Seam
 
         sources: list[Path] = []
         with listening_to_reads(sources.append):
@@ -190,8 +184,8 @@ class OutsideJob:
 
 def is_pattern_file(path: Path) -> bool:
     """Return whether a path is that of a pattern rather than of a scene: a folder, a JSON, DXF or SVG file, or a mesh."""
-    from warpflat.flat.surface.io.read import SUFFIXES
-    from warpflat.pattern.export.read_pattern import PATTERN_ENDINGS
+    from warpflat.flat import SUFFIXES
+    from warpflat.pattern import PATTERN_ENDINGS
 
     return path.is_dir() or path.suffix.lower() in (*PATTERN_ENDINGS, *SUFFIXES)
 
@@ -218,12 +212,12 @@ def edge_table(
 
 def _read(path: Path, table: SewingTable, units: str | None) -> tuple[Pattern, dict[str, Lift], Run]:
     """Return the pattern, the ways to its designed surface, and what its run says of body and girths."""
-    from warpflat.flat.surface.io.read import SUFFIXES
-    from warpflat.garment.draping.lift import read_lift, surface_lift
-    from warpflat.pattern.export.read_pattern import read_pattern
+    from warpflat.flat import SUFFIXES
+    from warpflat.garment import read_lift, surface_lift
+    from warpflat.pattern import read_pattern
 
     if path.suffix.lower() in SUFFIXES and not path.is_dir():
-        from warpflat.garment.construction.as_cut import read_cut_pattern
+        from warpflat.garment import read_cut_pattern
 
         worn = read_cut_pattern(path, units=units, name=make_file_name(path.stem))
         return worn.pattern, {name: surface_lift(*each) for name, each in worn.surfaces.items()}, Run()
@@ -255,8 +249,7 @@ def _changed(piece: Piece, entry: SewnPieceTable | None) -> Piece:
 
 
 def _side(text: str, *, reversed: bool) -> Any:
-    from warpflat.pattern.drafting.pieces import SeamSide
-    from warpflat.pattern.drafting.whole_pieces import MIRRORED
+    from warpflat.pattern import MIRRORED, SeamSide
 
     piece, _, edge = text.partition(".")
     if not edge:
@@ -289,7 +282,7 @@ def _worn_scan(
     """
     from scipy.spatial import cKDTree
 
-    from warpflat.garment.draping.lift import moved_lift
+    from warpflat.garment import moved_lift
 
     asked = _asked(given, table)
     if asked is None or asked.scan is None:
@@ -369,15 +362,18 @@ def drape_outside(
     """
     import warp as wp
 
-    from warpflat.core.activity import report_activity
-    from warpflat.core.output import optional_file, output_folder, remove_stale, require_own_metrics
-    from warpflat.flat.flattening.result import run_metrics
-    from warpflat.garment.construction.pattern_files import PatternOptions, outline_files
-    from warpflat.garment.draping.correct_pattern import relieve_pattern
-    from warpflat.garment.draping.drape_pattern import Placement, drape_pattern
-    from warpflat.garment.draping.moved_pattern import moved_outlines
-    from warpflat.garment.draping.options import DrapeOptions
-    from warpflat.garment.draping.write import write_drape_files
+    from warpflat.core import optional_file, output_folder, remove_stale, report_activity, require_own_metrics
+    from warpflat.flat import run_metrics
+    from warpflat.garment import (
+        DrapeOptions,
+        PatternOptions,
+        Placement,
+        drape_pattern,
+        moved_outlines,
+        outline_files,
+        relieve_pattern,
+        write_drape_files,
+    )
 
     table, pattern = job.sewing.drape, job.pattern
     cloth, notes = _fabric(job, fabric)
@@ -421,7 +417,7 @@ def drape_outside(
                 "edges": {},
             }
             with optional_file(folder / "corrected.png", files) as path:
-                from warpflat.garment.draping.correction_picture import write_correction_picture
+                from warpflat.garment import write_correction_picture
 
                 write_correction_picture(path, found)
             chosen = pattern.sample if size is None else size
@@ -449,7 +445,7 @@ def _correction_words(found: Correction) -> str:
 
 def _fabric(job: OutsideJob, name: str | None) -> tuple[Any, Sequence[str]]:
     """Return the cloth, and a note where it is a guess."""
-    from warpflat.flat.fabric.library import find_fabric, load_library
+    from warpflat.flat import find_fabric, load_library
 
     library = load_library()
     asked = name or job.sewing.fabric

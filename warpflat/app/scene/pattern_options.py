@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from warpflat.garment.construction.edge_rules import EdgeRules
+from warpflat.garment import EdgeRules
 
 if TYPE_CHECKING:
     from warpflat.app.scene.schema import ClothTable, MarkerTable, PatternTable
-from warpflat.garment.construction.pattern_files import PatternOptions
-from warpflat.pattern.drafting.shrinkage import Shrinkage
-from warpflat.pattern.drafting.words import language_words
+from warpflat.garment import PatternOptions
+from warpflat.pattern import Shrinkage, language_words
 
 __all__ = ["pattern_options"]
 
@@ -23,8 +22,7 @@ def pattern_options(
     Raises:
         InputError: a gap that is wide against the cloth.
     """
-    from warpflat.pattern.drafting.marker import Cloth
-    from warpflat.pattern.drafting.matched_lay import Stripes
+    from warpflat.pattern import Cloth, Stripes
 
     cloth = None
     if marker is not None:

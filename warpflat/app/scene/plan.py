@@ -17,38 +17,50 @@ from warpflat.app.scene.openings import scene_finishing, scene_openings, scene_p
 from warpflat.app.scene.pattern_options import pattern_options
 from warpflat.app.scene.seams import scene_constraints, scene_surface_seams, scene_wishes
 from warpflat.app.scene.surface import scene_pieces, scene_sewn_panels, scene_surface, with_piece_tables
-from warpflat.core.activity import report_activity
-from warpflat.core.errors import InputError, StepError
-from warpflat.core.output import optional_step
-from warpflat.flat.cutting.cut_piece import cut
-from warpflat.flat.cutting.remedies import advise
-from warpflat.flat.cutting.separate_pieces import cut_surfaces
-from warpflat.flat.fabric.library import as_fabric
-from warpflat.flat.flattening.flatten_all import flatten_all
-from warpflat.flat.flattening.flatten_piece import flatten
-from warpflat.flat.flattening.progress import Progress
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.solver.options import RelaxOptions
-from warpflat.flat.surface.border_seams import BorderSeam
-from warpflat.flat.surface.io.sewn_panels import SewnPanel
-from warpflat.flat.surface.mesh import Surface
-from warpflat.garment.construction.as_cut import garment_as_cut
-from warpflat.garment.construction.constraints import Constraint
-from warpflat.garment.construction.drawn_curves import CURVES_MM
-from warpflat.garment.construction.ease import SeamWish, cap_wishes, seam_ratios
-from warpflat.garment.construction.form_garment import FormGarment, flatten_form
-from warpflat.garment.construction.form_plan import check_fold_grain, find_fold_lines, plan_form
-from warpflat.garment.construction.garment import Garment
-from warpflat.garment.construction.openings import Opening, sized_opening
-from warpflat.garment.construction.pattern_files import PatternOptions, check_names
-from warpflat.garment.construction.sew_pieces import name_seams, sew_pieces
-from warpflat.garment.construction.to_pattern import check_edge_names
-from warpflat.garment.mannequin.bricks import select_bricks
-from warpflat.garment.mannequin.darts import dart_along
-from warpflat.garment.mannequin.forms import FormResult
-from warpflat.garment.mannequin.mannequin import Mannequin
-from warpflat.garment.mannequin.table import mannequin_from_table
-from warpflat.garment.seams.find import GRAIN, FoundSeams, seam_words
+from warpflat.core import InputError, StepError, optional_step, report_activity
+from warpflat.flat import (
+    BorderSeam,
+    Flattening,
+    Progress,
+    RelaxOptions,
+    SewnPanel,
+    Surface,
+    advise,
+    as_fabric,
+    cut,
+    cut_surfaces,
+    flatten,
+    flatten_all,
+)
+from warpflat.garment import (
+    CURVES_MM,
+    GRAIN,
+    Constraint,
+    FormGarment,
+    FormResult,
+    FoundSeams,
+    Garment,
+    Mannequin,
+    Opening,
+    PatternOptions,
+    SeamWish,
+    cap_wishes,
+    check_edge_names,
+    check_fold_grain,
+    check_names,
+    dart_along,
+    find_fold_lines,
+    flatten_form,
+    garment_as_cut,
+    mannequin_from_table,
+    name_seams,
+    plan_form,
+    seam_ratios,
+    seam_words,
+    select_bricks,
+    sew_pieces,
+    sized_opening,
+)
 
 __all__ = ["GarmentPlan", "MeshPlan", "flatten_surface", "plan_garment", "plan_mesh", "plan_scene", "scene_cuts"]
 
@@ -403,7 +415,7 @@ def flatten_surface(
     """
     settings, start = scene.settings, None
     if settings.start is not None:
-        from warpflat.flat.surface.io.read_layout import read_layout
+        from warpflat.flat import read_layout
 
         with errors_named(f"{scene.where}: start"):
             start = read_layout(scene.folder / expand_variables(settings.start))

@@ -6,13 +6,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from warpflat.core.errors import InputError
-from warpflat.garment.construction.finishing import Finishing, with_plackets
-from warpflat.garment.construction.openings import Opening, opened_rings, sized_opening
-from warpflat.garment.construction.rings import measure_rings
-from warpflat.garment.mannequin.forms import FormResult
-from warpflat.garment.mannequin.mannequin import Mannequin
-from warpflat.garment.mannequin.neckline import Neckline
+from warpflat.core import InputError
+from warpflat.garment import (
+    Finishing,
+    FormResult,
+    Mannequin,
+    Neckline,
+    Opening,
+    measure_rings,
+    opened_rings,
+    sized_opening,
+    with_plackets,
+)
 
 __all__ = ["wide_enough"]
 
@@ -40,7 +45,7 @@ def wide_enough(
         strain_limit: of the cloth.
         openings, finishing: of the garment; openings and plackets count.
     """
-    from warpflat.garment.construction.girths import pattern_girths  # loads the solver
+    from warpflat.garment import pattern_girths
 
     passed: dict[str, tuple[str, float]] = {}
     asked = form.recipe

@@ -20,11 +20,9 @@ from warpflat.app.scene.frames import MANNEQUIN, Film, FrameSchedule
 from warpflat.app.scene.load import Scene
 from warpflat.app.scene.plan import GarmentPlan, MeshPlan, plan_scene
 from warpflat.app.scene.schema import FileSurface
-from warpflat.core.activity import report_activity
-from warpflat.core.beside import Beside
-from warpflat.core.errors import StepError
-from warpflat.core.memory_limit import require_memory_for_run
-from warpflat.core.output import (
+from warpflat.core import (
+    Beside,
+    StepError,
     expect_files,
     file_in,
     latest_file,
@@ -32,24 +30,25 @@ from warpflat.core.output import (
     optional_step,
     output_folder,
     remove_stale,
+    report_activity,
+    require_memory_for_run,
     require_own_metrics,
 )
-from warpflat.flat.flattening.fit_report import Remedy
-from warpflat.flat.flattening.progress import Progress
-from warpflat.flat.flattening.verdict import judge
-from warpflat.flat.surface.io.read import size_words
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.triangles import triangulate
-from warpflat.garment.construction.form_garment import FormGarment
-from warpflat.garment.construction.garment import Garment
-from warpflat.garment.construction.pattern_files import WrittenPattern, garment_files, pattern_names
-from warpflat.garment.construction.sew_pieces import unsewn_notes
-from warpflat.garment.mannequin.forms import FormResult
-from warpflat.garment.mannequin.mannequin import Mannequin
-from warpflat.pattern.export.letters import note_on_names
+from warpflat.flat import Progress, Remedy, Surface, judge, size_words, triangulate
+from warpflat.garment import (
+    FormGarment,
+    FormResult,
+    Garment,
+    Mannequin,
+    WrittenPattern,
+    garment_files,
+    pattern_names,
+    unsewn_notes,
+)
+from warpflat.pattern import note_on_names
 
 if TYPE_CHECKING:
-    from warpflat.pattern.export.picture_drafted import DraftedOutline
+    from warpflat.pattern import DraftedOutline
 
 # From so many vertices on, pictures and pattern follow the film: beside it and the fit they would take the most memory of a run.
 _MANY = 500_000
@@ -245,8 +244,8 @@ def _run(
 
 def _drafted(plan: MeshPlan | GarmentPlan, garment: Garment) -> list[DraftedOutline]:
     """Return the pieces that finishing and pockets add, and where those of a form are worn."""
-    from warpflat.garment.construction.to_pattern import pattern_of_garment
-    from warpflat.pattern.export.picture_drafted import DraftedOutline
+    from warpflat.garment import pattern_of_garment
+    from warpflat.pattern import DraftedOutline
 
     drafted = list[DraftedOutline]()
     if not (garment.finishing or garment.pockets):
@@ -257,8 +256,7 @@ def _drafted(plan: MeshPlan | GarmentPlan, garment: Garment) -> list[DraftedOutl
         )
         worn: Mapping[str, Sequence[Surface]] = {}
         if isinstance(garment, FormGarment):
-            from warpflat.garment.draping.drape_pattern import place_drafted
-            from warpflat.garment.draping.lift import surface_lift
+            from warpflat.garment import place_drafted, surface_lift
 
             lifts = {
                 name: surface_lift(
@@ -296,12 +294,12 @@ def _measure_fit(
         if not isinstance(garment, FormGarment):
             for name, part in advised.parts.items():
                 with optional_file(file_in(folder, name, ".wear.png"), files) as path:
-                    from warpflat.pattern.export.fit_picture import write_wear_picture
+                    from warpflat.pattern import write_wear_picture
 
                     write_wear_picture(path, part)
         else:
             with optional_file(folder / "wear.png", files) as path:
-                from warpflat.pattern.export.fit_picture import write_wear_sheet
+                from warpflat.pattern import write_wear_sheet
 
                 on_body = [] if wearer is None else [wearer.pieces[name].as_dict() for name in advised.pieces]
                 write_wear_sheet(path, list(advised.pieces.values()), title=garment.name, on_body=on_body)
@@ -328,7 +326,7 @@ def _draft(plan: MeshPlan | GarmentPlan, sizes: Mapping[str, Garment], own_size:
         return pattern
     files = list(pattern.files)
     with optional_file(folder / "walked.png", files) as path:
-        from warpflat.pattern.export.picture_walked import write_walked_picture
+        from warpflat.pattern import write_walked_picture
 
         write_walked_picture(path, pattern.walked, title=scene.name)
     return replace(pattern, files=tuple(files))

@@ -16,15 +16,9 @@ from pydantic import (
     model_validator,
 )
 
-from warpflat.core.errors import is_number
-from warpflat.core.file_names import plain_name
-from warpflat.core.text import quote_value
-from warpflat.core.toml_file import Table
-from warpflat.flat.fabric.fabric import DEFAULT_FABRIC
-from warpflat.flat.fabric.file import FabricTable
-from warpflat.flat.solver.options import FORMER_SOLVERS, RelaxOptions, Solver
-from warpflat.flat.surface.first_shapes import PIECES
-from warpflat.garment.mannequin.table import MannequinTable
+from warpflat.core import Table, is_number, plain_name, quote_value
+from warpflat.flat import DEFAULT_FABRIC, FORMER_SOLVERS, PIECES, FabricTable, RelaxOptions, Solver
+from warpflat.garment import MannequinTable
 
 __all__ = [
     "AutoCutTable",

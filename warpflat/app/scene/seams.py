@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from warpflat.app.scene.schema import ConstraintTable, SeamTable
-from warpflat.core.errors import InputError, nearest
-from warpflat.flat.surface.border_seams import BorderSeam
-from warpflat.garment.construction.constraints import Constraint, FixedLength, Straight, Symmetric
-from warpflat.garment.construction.ease import SeamWish
+from warpflat.core import InputError, nearest
+from warpflat.flat import BorderSeam
+from warpflat.garment import Constraint, FixedLength, SeamWish, Straight, Symmetric
 
 __all__ = ["scene_constraints", "scene_surface_seams", "scene_wishes"]
 

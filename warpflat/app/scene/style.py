@@ -6,12 +6,17 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from typing import Any
 
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.toml_file import laid_over
-from warpflat.garment.mannequin.bricks import TRUNK_LEVELS
-from warpflat.garment.mannequin.forms import Form, form_from_mapping, shipped_form
-from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS, RING_LEVELS
-from warpflat.garment.mannequin.neckline import Neckline
+from warpflat.core import InputError, laid_over, nearest
+from warpflat.garment import (
+    ARM_LEVELS,
+    LEG_LEVELS,
+    RING_LEVELS,
+    TRUNK_LEVELS,
+    Form,
+    Neckline,
+    form_from_mapping,
+    shipped_form,
+)
 
 __all__ = ["STYLE_KEYS", "covered_bands", "style_options", "with_style"]
 

@@ -13,18 +13,20 @@ from warpflat.app.scene.schema import (
     LineTable,
     ShapeSurface,
 )
-from warpflat.core.arrays import IntArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.input_files import guarded
-from warpflat.flat.surface.io.read import RawMesh, read_mesh_file, surface_of_file
-from warpflat.flat.surface.io.sewn_panels import SewnPanel, read_sewn_panels
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.paths.border import SIDES, line_on_border
-from warpflat.flat.surface.paths.lines import (
+from warpflat.core import InputError, IntArray, guarded, nearest
+from warpflat.flat import (
+    SIDES,
+    RawMesh,
+    SewnPanel,
+    Surface,
     line_between,
     line_from_curve,
     line_from_indices,
+    line_on_border,
     line_on_plane,
+    read_mesh_file,
+    read_sewn_panels,
+    surface_of_file,
     with_lines,
 )
 
@@ -38,14 +40,13 @@ def scene_surface(scene: Scene, read: tuple[Path, RawMesh, float, list[Path]] | 
         InputError: the file or shape is wrong, an environment variable is not set, or a line is not on the surface.
     """
     from warpflat.app.scene.seams import scene_surface_seams
-    from warpflat.flat.surface.border_seams import surface_seams
+    from warpflat.flat import surface_seams
 
     table = scene.settings.surface
     if table is None:
         raise InputError(f"{scene.where}: the scene has no [surface]; this needs one piece, not a garment")
     if isinstance(table, ShapeSurface):
-        from warpflat.flat.surface.first_shapes import PIECES
-        from warpflat.flat.surface.shapes import make_shape
+        from warpflat.flat import PIECES, make_shape
 
         with errors_named(f"{scene.where}: surface"):
             if table.shape in PIECES:
@@ -118,9 +119,7 @@ def scene_pieces(scene: Scene) -> tuple[Surface, ...] | None:
     Raises:
         InputError: the file or a parameter of the shape is wrong, or an environment variable is not set.
     """
-    from warpflat.flat.surface.first_shapes import PIECES, make_pieces
-    from warpflat.flat.surface.io.read_pieces import read_pieces
-    from warpflat.flat.surface.repair.meet import MEET
+    from warpflat.flat import MEET, PIECES, make_pieces, read_pieces
 
     table = scene.settings.surface
     if isinstance(table, ShapeSurface) and table.shape in PIECES:

@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.app.scene.style import STYLE_KEYS, with_style
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.toml_file import check_table, document_as_toml, laid_over, read_toml
-from warpflat.garment.mannequin.table import MannequinTable, mannequin_from_table
+from warpflat.core import InputError, check_table, document_as_toml, laid_over, nearest, read_toml
+from warpflat.garment import MannequinTable, mannequin_from_table
 
 __all__ = ["GarmentOffer", "garment_offer", "offer_tables", "offers", "scene_text", "style_of", "taken_options"]
 

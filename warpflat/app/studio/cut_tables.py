@@ -13,14 +13,9 @@ from warpflat.app.scene.form import scene_recipe
 from warpflat.app.scene.load import Scene
 from warpflat.app.studio.pick import Hit
 from warpflat.app.studio.solve import Solution
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.surface.connectivity import border_loops
-from warpflat.garment.mannequin.bricks import select_bricks
-from warpflat.garment.mannequin.darts import FormDart, dart_along, usual_darts
-from warpflat.garment.mannequin.pieces import is_part_of
+from warpflat.core import FloatArray, InputError, IntArray, arc_lengths
+from warpflat.flat import Flattening, border_loops
+from warpflat.garment import FormDart, dart_along, is_part_of, select_bricks, usual_darts
 
 __all__ = ["cut_along", "cut_between", "cuttable_lines"]
 

@@ -24,8 +24,7 @@ from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from warpflat.core.errors import InputError
-from warpflat.core.text import quote_value
+from warpflat.core import InputError, quote_value
 
 __all__ = ["Door"]
 

@@ -9,12 +9,8 @@ from time import monotonic
 import numpy as np
 
 from warpflat.app.studio.worker import Ticket
-from warpflat.core.arrays import FloatArray
-from warpflat.flat.flattening.progress import Progress
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.flattening.step_by_step import RelaxationStep
-from warpflat.flat.model.strain import WornStrain, worn_strain
-from warpflat.flat.surface.mesh import Surface
+from warpflat.core import FloatArray
+from warpflat.flat import Flattening, Progress, RelaxationStep, Surface, WornStrain, worn_strain
 
 __all__ = ["PieceFrame", "Watch"]
 

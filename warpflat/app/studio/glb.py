@@ -7,9 +7,9 @@ import struct
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.flat.surface.normals import vertex_normals
-from warpflat.pattern.export.colours import linear_rgb
+from warpflat.core import FloatArray, IntArray
+from warpflat.flat import vertex_normals
+from warpflat.pattern import linear_rgb
 
 __all__ = ["before_tone_mapping", "coloured_mesh"]
 

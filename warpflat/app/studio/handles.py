@@ -12,15 +12,9 @@ import numpy as np
 from warpflat.app.scene.cuts import cut_of_dart, place_of
 from warpflat.app.scene.plan import GarmentPlan
 from warpflat.app.studio.solve import Solution
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.polyline import arc_lengths
-from warpflat.flat.flattening.applied_cut import seam_kind
-from warpflat.flat.surface.connectivity import border_loops
-from warpflat.flat.surface.cut.cut_mesh import Crack
-from warpflat.flat.surface.triangles import triangulate
-from warpflat.garment.mannequin.bricks import select_bricks
-from warpflat.garment.mannequin.darts import FormDart, PlacedDart, dart_part
-from warpflat.garment.mannequin.neckline import Neckline
+from warpflat.core import FloatArray, IntArray, arc_lengths
+from warpflat.flat import Crack, border_loops, seam_kind, triangulate
+from warpflat.garment import FormDart, Neckline, PlacedDart, dart_part, select_bricks
 
 __all__ = ["Handle", "pattern_handles"]
 

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpflat.app.studio.frame import PieceFrame
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.sums import weighted_percentile
-from warpflat.flat.model.strain import shear_angles
-from warpflat.garment.draping.result import Drape
-from warpflat.pattern.export.colours import SMALLEST_SCALE, energy_colours, energy_scale
-from warpflat.pattern.export.geometry import corner_average, face_areas
+from warpflat.core import FloatArray, IntArray, weighted_percentile
+from warpflat.flat import shear_angles
+from warpflat.garment import Drape
+from warpflat.pattern import SMALLEST_SCALE, corner_average, energy_colours, energy_scale, face_areas
 
 __all__ = ["MAPS", "Scale", "drape_gaps", "drape_scale", "face_values", "piece_scale", "vertex_values"]
 

@@ -18,8 +18,7 @@ from viser import (
     GuiTextHandle,
 )
 
-from warpflat.core.errors import InputError
-from warpflat.core.text import quote_value
+from warpflat.core import InputError, quote_value
 
 __all__ = ["read_message"]
 

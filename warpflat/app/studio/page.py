@@ -28,10 +28,8 @@ from warpflat.app.studio.session import Session, Step
 from warpflat.app.studio.solve import Solution
 from warpflat.app.studio.stage import Shown, Stage
 from warpflat.app.studio.worker import Worker
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
-from warpflat.garment.draping.result import Drape
-from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.core import FloatArray, InputError, IntArray
+from warpflat.garment import Drape, Mannequin
 
 __all__ = ["Page"]
 

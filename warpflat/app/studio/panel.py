@@ -14,13 +14,9 @@ from warpflat.app.studio.maps import MAPS, Scale
 from warpflat.app.studio.save import Saved
 from warpflat.app.studio.session import Preview, Session
 from warpflat.app.studio.solve import Solution
-from warpflat.core.errors import InputError
-from warpflat.core.text import energy_words
-from warpflat.flat.fabric.library import load_library
-from warpflat.flat.flattening.progress import relaxation_words
-from warpflat.garment.mannequin.ease import EASE_PRESETS
-from warpflat.garment.mannequin.forms import form_names
-from warpflat.garment.mannequin.measurements import size_names, size_tables
+from warpflat.core import InputError, energy_words
+from warpflat.flat import load_library, relaxation_words
+from warpflat.garment import EASE_PRESETS, form_names, size_names, size_tables
 
 __all__ = ["Actions", "Panel", "preview_words"]
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import FloatArray, IntArray
+from warpflat.flat import triangulate
 
 __all__ = ["Hit", "nearest_line", "pick_flat", "pick_on_rays"]
 

@@ -9,11 +9,8 @@ from typing import Any
 
 from warpflat.app.scene.load import Scene, load_scene
 from warpflat.app.scene.run import run_scene
-from warpflat.core.errors import InputError
-from warpflat.core.file_names import check_file_name, make_file_name, plain_name
-from warpflat.core.output import atomic_path
-from warpflat.core.toml_file import document_as_toml
-from warpflat.flat.flattening.progress import Progress
+from warpflat.core import InputError, atomic_path, check_file_name, document_as_toml, make_file_name, plain_name
+from warpflat.flat import Progress
 
 __all__ = ["Saved", "free_name", "run_saved", "scene_file", "write_scene"]
 

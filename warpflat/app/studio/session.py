@@ -17,13 +17,9 @@ from warpflat.app.studio.frame import PieceFrame, Watch
 from warpflat.app.studio.save import Saved, run_saved, scene_file, write_scene
 from warpflat.app.studio.solve import Solution, solve
 from warpflat.app.studio.worker import Job, Superseded, Ticket
-from warpflat.core.activity import activity_listener
-from warpflat.core.errors import InputError, system_reason
-from warpflat.core.text import one_line
-from warpflat.flat.flattening.step_by_step import relaxation
-from warpflat.garment.draping.drape_garment import drape
-from warpflat.garment.draping.options import DrapeOptions
-from warpflat.garment.draping.result import Drape
+from warpflat.core import InputError, activity_listener, one_line, system_reason
+from warpflat.flat import relaxation
+from warpflat.garment import Drape, DrapeOptions, drape
 
 __all__ = ["Preview", "Runner", "Session", "Step"]
 

@@ -14,18 +14,8 @@ from warpflat.app.scene.form_shaping import settle_shape, without_closed_darts
 from warpflat.app.scene.load import Scene, errors_named, expand_variables, scene_relax_options
 from warpflat.app.scene.plan import GarmentPlan, plan_garment, plan_mesh, scene_cuts
 from warpflat.app.scene.surface import scene_surface
-from warpflat.flat.cutting.cut_piece import cut
-from warpflat.flat.cutting.cut_plan import CutPlan
-from warpflat.flat.flattening.applied_cut import measure_cut
-from warpflat.flat.flattening.fit_report import garment_wear
-from warpflat.flat.flattening.progress import Progress
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.flattening.verdict import Verdict, judge
-from warpflat.flat.surface.mesh import Surface
-from warpflat.garment.construction.darts import measure_darts
-from warpflat.garment.construction.form_garment import FormGarment
-from warpflat.garment.mannequin.mannequin import Mannequin
-from warpflat.garment.mannequin.table import mannequin_from_table
+from warpflat.flat import CutPlan, Flattening, Progress, Surface, Verdict, cut, garment_wear, judge, measure_cut
+from warpflat.garment import FormGarment, Mannequin, mannequin_from_table, measure_darts
 
 __all__ = ["Solution", "solve"]
 

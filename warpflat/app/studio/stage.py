@@ -15,12 +15,9 @@ from warpflat.app.studio.frame import PieceFrame
 from warpflat.app.studio.glb import coloured_mesh
 from warpflat.app.studio.maps import Scale, face_values, vertex_values
 from warpflat.app.studio.pick import Hit, pick_flat, pick_on_rays
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.normals import vertex_normals
-from warpflat.flat.surface.triangles import triangulate
-from warpflat.pattern.export.geometry import outline_edges
-from warpflat.pattern.export.usd_prims import rows_on_table
+from warpflat.core import FloatArray, IntArray
+from warpflat.flat import Surface, triangulate, vertex_normals
+from warpflat.pattern import outline_edges, rows_on_table
 
 __all__ = ["Shown", "Stage"]
 

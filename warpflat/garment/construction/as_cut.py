@@ -9,19 +9,23 @@ from pathlib import Path
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.input_files import guarded
-from warpflat.core.polyline import polyline_length
-from warpflat.flat.fabric.fabric import DEFAULT_FABRIC, Fabric
-from warpflat.flat.fabric.library import as_fabric
-from warpflat.flat.flattening.as_cut import CutPattern, distances_laid, laid_as_cut
-from warpflat.flat.surface.io.sewn_panels import SewnPanel, read_sewn_panels
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import FloatArray, IntArray, guarded, polyline_length
+from warpflat.flat import (
+    DEFAULT_FABRIC,
+    CutPattern,
+    Fabric,
+    SewnPanel,
+    Surface,
+    as_fabric,
+    distances_laid,
+    laid_as_cut,
+    read_sewn_panels,
+    triangulate,
+)
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.sew_pieces import meeting_borders, name_seams
 from warpflat.garment.construction.to_pattern import pattern_of_garment
-from warpflat.pattern.drafting.pieces import Pattern, Seam
+from warpflat.pattern import Pattern, Seam
 
 __all__ = ["WornPattern", "garment_as_cut", "read_cut_pattern", "worn_at"]
 

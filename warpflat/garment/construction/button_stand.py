@@ -6,14 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths, part_between, points_at_lengths
-from warpflat.core.text import find_unused_name
+from warpflat.core import FloatArray, InputError, arc_lengths, find_unused_name, part_between, points_at_lengths
 from warpflat.garment.construction.facings import STAND, STAND_END
 from warpflat.garment.construction.openings import Buttons, Opening
-from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT, Edge
-from warpflat.pattern.drafting.pieces import Piece
+from warpflat.pattern import FOLD_STRAIGHT, Edge, Piece
 
 __all__ = ["bust_depth", "button_depths", "buttonhole", "with_button_stand", "with_wrap"]
 

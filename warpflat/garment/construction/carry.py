@@ -11,14 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.sparse import factor_symmetric
-from warpflat.flat.surface.connectivity import border_loops
-from warpflat.flat.surface.falloff import falloff_weights
-from warpflat.flat.surface.laplacian import cotangent_matrix
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.normals import vertex_normals
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import FloatArray, factor_symmetric
+from warpflat.flat import Surface, border_loops, cotangent_matrix, falloff_weights, triangulate, vertex_normals
 
 __all__ = ["carry", "carry_points", "skin_frames", "skin_under"]
 

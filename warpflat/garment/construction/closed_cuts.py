@@ -7,14 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.flat.flattening.applied_cut import seam_kind
-from warpflat.flat.surface.connectivity import join_labels
+from warpflat.core import FloatArray, IntArray
+from warpflat.flat import join_labels, seam_kind
 
 if TYPE_CHECKING:
-    from warpflat.flat.flattening.applied_cut import AppliedCut
-    from warpflat.flat.flattening.result import Flattening
-    from warpflat.flat.surface.cut.cut_mesh import Crack
+    from warpflat.flat import AppliedCut, Crack, Flattening
 
 __all__ = ["CLOSED", "are_closed", "close_cuts", "seams_of_cuts"]
 

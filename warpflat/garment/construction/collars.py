@@ -10,10 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length
-from warpflat.core.text import find_unused_name
+from warpflat.core import FloatArray, InputError, arc_lengths, find_unused_name, points_at_lengths, polyline_length
 from warpflat.garment.construction.button_stand import buttonhole
 from warpflat.garment.construction.free_edges import (
     OFF_END,
@@ -26,9 +23,7 @@ from warpflat.garment.construction.free_edges import (
     split_edge,
 )
 from warpflat.garment.construction.strips import Strip, strip_edges, swept
-from warpflat.pattern.drafting.fitting import drawn_length
-from warpflat.pattern.drafting.piece_parts import Edge
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide, drawn_length
 
 __all__ = ["COLLARS", "Collar", "with_collar", "with_hood"]
 

@@ -8,25 +8,23 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.polyline import segment_lengths
-from warpflat.flat.fabric.fabric import grain_axes
-from warpflat.flat.model.constraint_equations import (
+from warpflat.core import FloatArray, InputError, IntArray, nearest, segment_lengths
+from warpflat.flat import (
     ConstraintEquations,
+    grain_axes,
     length_equations,
     level_equations,
     mirror_equations,
+    mirror_partners,
     one_group,
     seam_equations,
     shape_equations,
     smooth_equations,
     straight_equations,
 )
-from warpflat.flat.surface.mirror import mirror_partners
 
 if TYPE_CHECKING:
-    from warpflat.flat.flattening.result import Flattening
+    from warpflat.flat import Flattening
     from warpflat.garment.mannequin.forms import FormResult
 
 __all__ = [

@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import arc_lengths, nearest_on_polyline, polyline_length
-from warpflat.flat.surface.cut.dart_legs import open_length
-from warpflat.flat.surface.overlap import OVERLAP
+from warpflat.core import FloatArray, arc_lengths, nearest_on_polyline, polyline_length
+from warpflat.flat import OVERLAP, open_length
 from warpflat.garment.construction.closed_cuts import CLOSED
 from warpflat.garment.construction.constraints import DartMouth
 from warpflat.garment.construction.sewn import Stitching

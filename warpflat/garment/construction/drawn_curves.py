@@ -13,11 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.polyline import turning_angles
+from warpflat.core import FloatArray, IntArray, turning_angles
 from warpflat.garment.construction.constraints import Constraint, DrawnLine, FixedLength, KeptGirth, Straight
-from warpflat.pattern.drafting.fairing import count_inflections, fair_line, fairest_line
-from warpflat.pattern.drafting.piece_parts import HEMMED_LEVELS
+from warpflat.pattern import HEMMED_LEVELS, count_inflections, fair_line, fairest_line
 
 if TYPE_CHECKING:
     from warpflat.garment.construction.sewn import ConstraintResult

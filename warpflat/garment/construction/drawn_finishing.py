@@ -12,12 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.polyline import arc_lengths
-from warpflat.core.text import without_side
-from warpflat.flat.surface.normals import vertex_normals
-from warpflat.flat.surface.triangles import triangulate
-from warpflat.pattern.drafting.worn import ViewedPiece
+from warpflat.core import BoolArray, FloatArray, arc_lengths, without_side
+from warpflat.flat import triangulate, vertex_normals
+from warpflat.pattern import ViewedPiece
 
 if TYPE_CHECKING:
     from warpflat.garment.construction.finishing import Finishing

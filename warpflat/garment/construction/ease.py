@@ -8,17 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.polyline import arc_lengths
-from warpflat.flat.fabric.fabric import Fabric
+from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest
+from warpflat.flat import Fabric
 from warpflat.garment.construction.form_plan import plan_form
 from warpflat.garment.construction.fullness import FullEdge
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.forms import FormResult
     from warpflat.garment.mannequin.pieces import FormPiece
-    from warpflat.pattern.drafting.pieces import Seam, SeamSide
+    from warpflat.pattern import Seam, SeamSide
 
 __all__ = ["CAP_PART", "SeamRatios", "SeamWish", "cap_wishes", "measure_ease", "seam_ratios"]
 

@@ -9,10 +9,8 @@ from itertools import islice, pairwise, product
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import arc_lengths, points_at_lengths
-from warpflat.core.text import without_side
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.core import FloatArray, arc_lengths, points_at_lengths, without_side
+from warpflat.pattern import Pattern, Piece, Seam, SeamSide
 
 __all__ = ["draw_equal_pieces_once"]
 

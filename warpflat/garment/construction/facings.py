@@ -12,12 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths, points_at_lengths
-from warpflat.core.text import find_unused_name, without_side
-from warpflat.pattern.drafting.piece_parts import Edge
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.core import FloatArray, InputError, arc_lengths, find_unused_name, points_at_lengths, without_side
+from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
 
 __all__ = ["INNER", "STAND", "STAND_END", "Stand", "centre_notch", "is_beside", "with_facings", "with_stand_facings"]
 

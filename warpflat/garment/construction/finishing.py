@@ -7,9 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.text import find_unused_name, other_side, without_side
+from warpflat.core import FloatArray, InputError, find_unused_name, nearest, other_side, without_side
 from warpflat.garment.construction.button_stand import buttonhole
 from warpflat.garment.construction.collars import Collar, with_collar, with_hood
 from warpflat.garment.construction.facings import Stand, centre_notch, is_beside, with_facings, with_stand_facings
@@ -18,7 +16,7 @@ from warpflat.garment.construction.free_edges import Break, FreeChain, chain_len
 from warpflat.garment.construction.plackets import with_placket, with_slits
 from warpflat.garment.construction.shaped_band import shortened, slant_rises, with_shaped_waistband
 from warpflat.garment.construction.strips import CLOTH_WIDTH, Strip, panel_count, strip_edges, swept
-from warpflat.pattern.drafting.pieces import Elastic, Pattern, Piece, Seam, SeamSide
+from warpflat.pattern import Elastic, Pattern, Piece, Seam, SeamSide
 
 __all__ = ["FINISHES", "Finishing", "finish_edges", "hem_rises", "with_plackets"]
 

@@ -9,13 +9,11 @@ from itertools import groupby, pairwise
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.text import find_unused_name
+from warpflat.core import FloatArray, InputError, find_unused_name
 from warpflat.garment.construction.facings import centre_notch
 from warpflat.garment.construction.free_edges import FreeChain, chain_length, neighbour
 from warpflat.garment.construction.strips import CLOTH_WIDTH, Strip, panel_count, strip_edges, swept
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern import Pattern, Piece, Seam, SeamSide
 
 __all__ = ["with_flounce"]
 

@@ -8,13 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import part_between
-from warpflat.core.text import find_unused_name
+from warpflat.core import FloatArray, InputError, find_unused_name, part_between
 from warpflat.garment.construction.strips import Strip, strip_edges, swept
-from warpflat.pattern.drafting.piece_parts import Edge
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
 
 __all__ = ["with_flies"]
 

@@ -10,14 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core.arrays import IntArray
-from warpflat.core.errors import expect, expect_callback, expect_each
-from warpflat.flat.fabric.fabric import DEFAULT_FABRIC, Fabric
-from warpflat.flat.flattening.flatten_all import flatten_all
-from warpflat.flat.flattening.progress import Progress
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.model.fit import TOUCHING
-from warpflat.flat.solver.options import RelaxOptions
+from warpflat.core import IntArray, expect, expect_callback, expect_each
+from warpflat.flat import DEFAULT_FABRIC, TOUCHING, Fabric, Flattening, Progress, RelaxOptions, flatten_all
 from warpflat.garment.construction.constraints import (
     Constraint,
     DartMouth,
@@ -42,7 +36,7 @@ from warpflat.garment.mannequin.forms import FormResult
 from warpflat.garment.mannequin.mannequin import Mannequin
 
 if TYPE_CHECKING:
-    from warpflat.pattern.export.picture_garment import Body
+    from warpflat.pattern import Body
 
 __all__ = ["FormGarment", "flatten_form"]
 
@@ -115,7 +109,7 @@ class FormGarment(Garment):
     @property
     def drawn_body(self) -> Body:
         """The body on which a picture shows it first."""
-        from warpflat.pattern.export.picture_garment import Body
+        from warpflat.pattern import Body
 
         return Body(vertices=self.mannequin.vertices, faces=np.asarray(self.mannequin.layout.faces, dtype=np.int32))
 

@@ -9,12 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import IntArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.text import find_unused_name
+from warpflat.core import InputError, IntArray, find_unused_name, nearest
 from warpflat.garment.construction.edge_rules import EdgeRules
-from warpflat.pattern.drafting.piece_parts import HEMMED_LEVELS
-from warpflat.pattern.drafting.pieces import Seam, SeamSide
+from warpflat.pattern import HEMMED_LEVELS, Seam, SeamSide
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.forms import FormResult

@@ -7,11 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length
-from warpflat.core.text import find_unused_name, other_side, without_side
-from warpflat.pattern.drafting.fitting import drawn_length
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.core import (
+    FloatArray,
+    arc_lengths,
+    find_unused_name,
+    other_side,
+    points_at_lengths,
+    polyline_length,
+    without_side,
+)
+from warpflat.pattern import Pattern, Piece, Seam, SeamSide, drawn_length
 
 __all__ = [
     "OFF_END",

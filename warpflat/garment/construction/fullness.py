@@ -14,21 +14,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.polyline import polyline_length
-from warpflat.flat.fabric.fabric import grain_axes
-from warpflat.flat.flattening.progress import STEPS, Stage
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.model.membrane import step_matrix
-from warpflat.flat.model.network import SpringNetwork
-from warpflat.flat.model.springs import SpringArrays, springs_of, with_stiffness
-from warpflat.flat.model.strain import strain_energy
-from warpflat.flat.solver.equations import relax_under_equations
-from warpflat.flat.solver.grain import GrainAlignment
-from warpflat.flat.solver.options import RelaxOptions, given_options
-from warpflat.flat.solver.steps import Relaxation
-from warpflat.flat.surface.connectivity import border_loops
-from warpflat.flat.surface.falloff import falloff_weights
+from warpflat.core import FloatArray, IntArray, polyline_length
+from warpflat.flat import (
+    STEPS,
+    Flattening,
+    GrainAlignment,
+    Relaxation,
+    RelaxOptions,
+    SpringArrays,
+    SpringNetwork,
+    Stage,
+    border_loops,
+    falloff_weights,
+    given_options,
+    grain_axes,
+    relax_under_equations,
+    springs_of,
+    step_matrix,
+    strain_energy,
+    with_stiffness,
+)
 
 __all__ = ["FullEdge", "give_fullness", "measure_fullness"]
 

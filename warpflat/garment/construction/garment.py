@@ -10,13 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.polyline import arc_lengths, polyline_length
-from warpflat.flat.cutting.separate_pieces import separate
-from warpflat.flat.flattening.as_cut import CutPattern
-from warpflat.flat.flattening.result import Flattening, run_metrics
-from warpflat.flat.surface.border_seams import BorderSeam
-from warpflat.flat.surface.mirror import mirror_images
+from warpflat.core import FloatArray, IntArray, arc_lengths, polyline_length
+from warpflat.flat import BorderSeam, CutPattern, Flattening, mirror_images, run_metrics, separate
 from warpflat.garment.construction.sewn import MeasuredSeam, Sewn, Stitching
 
 if TYPE_CHECKING:
@@ -24,8 +19,7 @@ if TYPE_CHECKING:
     from warpflat.garment.construction.openings import Opening
     from warpflat.garment.construction.pockets import Pocket
     from warpflat.garment.construction.rings import GarmentRing
-    from warpflat.pattern.export.picture_drafted import DraftedOutline
-    from warpflat.pattern.export.picture_garment import Body
+    from warpflat.pattern import Body, DraftedOutline
 
 __all__ = ["Garment"]
 
@@ -205,7 +199,7 @@ class Garment:
         Raises:
             InputError: the folder cannot be written, or the body was read from a file there that would be replaced.
         """
-        from warpflat.core.output import output_folder, require_own_metrics, write_report
+        from warpflat.core import output_folder, require_own_metrics, write_report
 
         others = [*(["picture.png"] if picture else []), "metrics.json"]
         with output_folder(folder, others, sources=self.sources, guard=True) as to:
@@ -225,7 +219,7 @@ class Garment:
         Raises:
             InputError: the folder cannot be written.
         """
-        from warpflat.pattern.export.piece_files import write_pieces
+        from warpflat.pattern import write_pieces
 
         return write_pieces(
             list(self.parts.values()), folder, picture=picture, frames=False, body=self.drawn_body, drafted=drafted

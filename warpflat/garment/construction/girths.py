@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.text import without_side
+from warpflat.core import FloatArray, IntArray, without_side
 from warpflat.garment.construction.constraints import KeptGirth
 from warpflat.garment.construction.tapes import PieceEdges, stretch_tape
 from warpflat.garment.construction.wearer import body_rows

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from warpflat.core.arrays import FloatArray
-from warpflat.flat.surface.normals import vertex_normals
+from warpflat.core import FloatArray
+from warpflat.flat import vertex_normals
 from warpflat.garment.construction.carry import skin_under
 from warpflat.garment.mannequin.body_landmarks import model_places
 from warpflat.garment.mannequin.body_model import finer_body

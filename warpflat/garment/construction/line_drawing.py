@@ -11,24 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.polyline import arc_lengths, points_at_lengths
-from warpflat.core.text import other_side, without_side
-from warpflat.flat.flattening.verdict import judge
-from warpflat.flat.surface.connectivity import border_loops
-from warpflat.flat.surface.normals import vertex_normals
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import FloatArray, IntArray, arc_lengths, other_side, points_at_lengths, without_side
+from warpflat.flat import border_loops, judge, triangulate, vertex_normals
 from warpflat.garment.construction.button_stand import button_depths
 from warpflat.garment.construction.drawn_finishing import finishing_views
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.girths import pattern_girths
 from warpflat.garment.construction.mark_openings import TIE_WIDTH
 from warpflat.garment.construction.openings import Buttons, place_opening
-from warpflat.pattern.drafting.pieces import Piece
-from warpflat.pattern.drafting.worn import ClothKind, Measure, NeededOpening, ViewedPiece, Worn
+from warpflat.pattern import ClothKind, Measure, NeededOpening, Piece, ViewedPiece, Worn
 
 if TYPE_CHECKING:
-    from warpflat.flat.flattening.result import Flattening
+    from warpflat.flat import Flattening
     from warpflat.garment.construction.garment import Garment
 
 __all__ = ["describe_worn"]

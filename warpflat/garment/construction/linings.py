@@ -7,12 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpflat.core.errors import InputError
-from warpflat.core.text import find_unused_name
+from warpflat.core import InputError, find_unused_name
 from warpflat.garment.construction.facings import INNER, centre_notch
 from warpflat.garment.construction.shaped_band import without_strip
-from warpflat.pattern.drafting.piece_parts import Edge
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
 
 __all__ = ["add_interfacing", "add_lining", "add_pocketing"]
 

@@ -7,15 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import part_between, polyline_length
-from warpflat.core.text import find_unused_name
+from warpflat.core import FloatArray, InputError, find_unused_name, part_between, polyline_length
 from warpflat.garment.construction.button_stand import bust_depth, button_depths, with_button_stand, with_wrap
 from warpflat.garment.construction.openings import Opening, OpeningPart
 from warpflat.garment.construction.strips import Strip, strip_edges, swept
-from warpflat.pattern.drafting.piece_parts import Edge
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
+from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamOpening, SeamSide
 
 __all__ = ["lines_inside", "mark_openings", "with_notches"]
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.polyline import arc_lengths
-from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
+from warpflat.core import arc_lengths
+from warpflat.pattern import Piece, Seam, SeamSide
 
 if TYPE_CHECKING:
     from warpflat.garment.construction.garment import Garment

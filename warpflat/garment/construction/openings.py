@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.polyline import arc_lengths
+from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest
 from warpflat.garment.construction.rings import find_rings, ring_line
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.forms import Form, PieceRecipe

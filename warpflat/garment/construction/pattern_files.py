@@ -9,26 +9,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpflat._version import __version__
-from warpflat.core.activity import report_activity
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.file_kinds import foreign_words, other_kind_words
-from warpflat.core.file_names import make_file_name
-from warpflat.core.text import format_count, plain_letters
+from warpflat.core import (
+    InputError,
+    foreign_words,
+    format_count,
+    make_file_name,
+    nearest,
+    other_kind_words,
+    plain_letters,
+    report_activity,
+)
 from warpflat.garment.construction.edge_rules import EdgeRules
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.linings import add_interfacing, add_lining, add_pocketing
 from warpflat.garment.construction.strips import CLOTH_WIDTH
-from warpflat.pattern.drafting.shrinkage import Shrinkage, enlarged
+from warpflat.pattern import Shrinkage, enlarged
 
 if TYPE_CHECKING:
-    from warpflat.flat.flattening.result import Flattening
-    from warpflat.flat.surface.border_seams import BorderSeam
+    from warpflat.flat import BorderSeam, Flattening
     from warpflat.garment.construction.garment import Garment
-    from warpflat.pattern.drafting.drafted import DraftedGarment
-    from warpflat.pattern.drafting.marker import Cloth
-    from warpflat.pattern.drafting.piece_parts import FoundSeam
-    from warpflat.pattern.drafting.pieces import Pattern
-    from warpflat.pattern.drafting.walked import WalkedSeam
+    from warpflat.pattern import Cloth, DraftedGarment, FoundSeam, Pattern, WalkedSeam
 
 __all__ = [
     "FORMATS",
@@ -228,7 +228,7 @@ def export_patterns(
         InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", an allowance of a pattern that
             has its own, or the folder cannot be written.
     """
-    from warpflat.core.output import file_in
+    from warpflat.core import file_in
 
     for format in formats:
         if format not in FORMATS:
@@ -290,8 +290,8 @@ def _rewritten(
 
     `over_itself` is whether pattern.json may be written over itself, as it may be where that is asked for.
     """
-    from warpflat.core.output import output_folder, record_file, write_report
-    from warpflat.pattern.export.read_pattern import PATTERN_ENDINGS, read_drafted
+    from warpflat.core import output_folder, record_file, write_report
+    from warpflat.pattern import PATTERN_ENDINGS, read_drafted
 
     is_file = source.suffix.lower() in PATTERN_ENDINGS and not source.is_dir()
     if not is_file and source.is_file():
@@ -325,14 +325,8 @@ def _write_pattern(
     make: Callable[[], tuple[Pattern, tuple[str, ...]]], to: str | Path, name: str, options: PatternOptions
 ) -> WrittenPattern:
     """Make, draft and write a pattern; what cannot be drawn or written of it is left out (:func:`warpflat.core.output.optional_step`)."""
-    from warpflat.core.left_out import LeftOut, listening_to_left_out
-    from warpflat.core.output import file_in, optional_step, output_folder
-    from warpflat.pattern.drafting.curves import TOLERANCE
-    from warpflat.pattern.drafting.cut_list import cut_list
-    from warpflat.pattern.drafting.draft import draft_garment
-    from warpflat.pattern.drafting.notches import MEET
-    from warpflat.pattern.drafting.walked import walk_seams
-    from warpflat.pattern.export.pdf import too_many_sheets
+    from warpflat.core import LeftOut, file_in, listening_to_left_out, optional_step, output_folder
+    from warpflat.pattern import MEET, TOLERANCE, cut_list, draft_garment, too_many_sheets, walk_seams
 
     if not options.formats and options.cloth is None:
         return WrittenPattern()
@@ -460,13 +454,8 @@ def _write(
     english: bool = False,
 ) -> tuple[str, tuple[str, ...]]:
     """Write one file and return its name, and what the format leaves out."""
-    from warpflat.core.output import file_in
-    from warpflat.pattern.export.dxf import write_dxf
-    from warpflat.pattern.export.garmentcode import write_garmentcode
-    from warpflat.pattern.export.pattern_json import write_pattern_json
-    from warpflat.pattern.export.pdf import write_pdf
-    from warpflat.pattern.export.plt import write_plt
-    from warpflat.pattern.export.svg import write_svg
+    from warpflat.core import file_in
+    from warpflat.pattern import write_dxf, write_garmentcode, write_pattern_json, write_pdf, write_plt, write_svg
 
     start, _, ending = FORMATS[kind].partition("{}")
     file = file_in(folder, start or name, ending) if "{}" in FORMATS[kind] else folder / start
@@ -502,11 +491,8 @@ def _marker(
 
     Returns names, notes and the measures of each marker, or why there is none.
     """
-    from warpflat.core.output import file_in, optional_step, write_json
-    from warpflat.pattern.drafting.cut_list import cloths_of
-    from warpflat.pattern.drafting.marker import make_marker
-    from warpflat.pattern.drafting.matched_lay import Stripes
-    from warpflat.pattern.export.svg import write_marker_svg
+    from warpflat.core import file_in, optional_step, write_json
+    from warpflat.pattern import Stripes, cloths_of, make_marker, write_marker_svg
 
     report_activity(f"laying the marker, {seconds} s at most")
     cloths = list(dict.fromkeys(each for row in drafted.pieces.values() for piece in row for each in cloths_of(piece)))

@@ -7,14 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths, points_at_lengths
-from warpflat.core.text import find_unused_name
+from warpflat.core import FloatArray, InputError, arc_lengths, find_unused_name, points_at_lengths
 from warpflat.garment.construction.button_stand import buttonhole
 from warpflat.garment.construction.free_edges import Break, free_chain, marks_of, split_edge
 from warpflat.garment.construction.strips import Strip, strip_edges, swept
-from warpflat.pattern.drafting.pieces import Pattern, Piece
+from warpflat.pattern import Pattern, Piece
 
 __all__ = ["with_placket", "with_slits"]
 

@@ -10,14 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.polyline import arc_lengths, part_between, points_at_lengths, polyline_length
-from warpflat.core.text import find_unused_name, other_side
+from warpflat.core import (
+    FloatArray,
+    InputError,
+    arc_lengths,
+    find_unused_name,
+    nearest,
+    other_side,
+    part_between,
+    points_at_lengths,
+    polyline_length,
+)
 from warpflat.garment.construction.mark_openings import lines_inside, with_notches
 from warpflat.garment.construction.strips import Strip, strip_edges, swept
-from warpflat.pattern.drafting.piece_parts import Edge
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
 
 __all__ = ["Pocket", "add_pockets"]
 

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.text import find_unused_name
+from warpflat.core import FloatArray, IntArray, find_unused_name
 from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LINES, RING_LEVELS
 
 if TYPE_CHECKING:

@@ -10,25 +10,30 @@ from typing import Any, Literal
 
 import numpy as np
 
-from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths, polyline_length
-from warpflat.core.text import find_unused_name
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.flattening.straight_band import cut_straight, find_band
-from warpflat.flat.solver.options import RelaxOptions
-from warpflat.flat.surface.border_seams import SAME_PLACE, BorderSeam, surface_seams
-from warpflat.flat.surface.connectivity import border_loops, join_labels
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.mirror import even_sides, mirror_images
-from warpflat.flat.surface.repair.layers import Layer, lies_within
+from warpflat.core import BoolArray, FloatArray, InputError, arc_lengths, find_unused_name, polyline_length
+from warpflat.flat import (
+    SAME_PLACE,
+    BorderSeam,
+    Flattening,
+    Layer,
+    RelaxOptions,
+    Surface,
+    border_loops,
+    cut_straight,
+    even_sides,
+    find_band,
+    join_labels,
+    lies_within,
+    mirror_images,
+    surface_seams,
+)
 from warpflat.garment.construction.closed_cuts import seams_of_cuts
 from warpflat.garment.construction.constraints import Constraint, KeptGirth
 from warpflat.garment.construction.fullness import FullEdge, give_fullness
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.sewing import sew
 from warpflat.garment.construction.sewn import Sewn, Stitching
-from warpflat.pattern.drafting.corners import find_corners
+from warpflat.pattern import find_corners
 
 __all__ = ["Bands", "meeting_borders", "name_seams", "sew_pieces", "unsewn_borders", "unsewn_notes"]
 

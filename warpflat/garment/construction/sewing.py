@@ -19,34 +19,38 @@ from dataclasses import replace
 import numpy as np
 import warp as wp
 
-from warpflat.core.activity import report_activity
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError, StepError
-from warpflat.core.sums import range_offsets
-from warpflat.flat.flattening.applied_cut import cut_sides
-from warpflat.flat.flattening.progress import CONTACT, STEPS, Stage
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.model.constraint_equations import (
+from warpflat.core import FloatArray, InputError, IntArray, StepError, range_offsets, report_activity
+from warpflat.flat import (
+    CONTACT,
+    STEPS,
+    ConstrainedOutcome,
     ConstraintEquations,
     Correction,
+    Flattening,
+    Outcome,
+    Relaxation,
+    RelaxOptions,
+    SpringNetwork,
+    Stage,
+    cut_sides,
+    factor_pays,
+    falloff_weights,
     girth_equations,
+    given_options,
+    grain_alignments,
+    is_injective,
     join_equations,
+    join_networks,
+    join_surfaces,
     one_group,
+    overlap_area,
+    relax_under_equations,
     seam_equations,
     smooth_equations,
+    stiffness_matrix,
+    strain_energy,
     stretch_equations,
 )
-from warpflat.flat.model.join import join_networks, join_surfaces
-from warpflat.flat.model.network import SpringNetwork
-from warpflat.flat.model.strain import strain_energy
-from warpflat.flat.solver.equations import ConstrainedOutcome, factor_pays, relax_under_equations
-from warpflat.flat.solver.grain import grain_alignments
-from warpflat.flat.solver.metric import stiffness_matrix
-from warpflat.flat.solver.options import RelaxOptions, given_options
-from warpflat.flat.solver.steps import Relaxation
-from warpflat.flat.solver.stop import Outcome
-from warpflat.flat.surface.falloff import falloff_weights
-from warpflat.flat.surface.injective import is_injective, overlap_area
 from warpflat.garment.construction.constraints import (
     Constraint,
     DrawnLine,

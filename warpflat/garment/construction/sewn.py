@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.flat.flattening.result import Flattening
+from warpflat.core import FloatArray, IntArray
+from warpflat.flat import Flattening
 
 __all__ = ["ConstraintResult", "MeasuredSeam", "Sewn", "Stitching"]
 

@@ -7,15 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.polyline import arc_lengths, part_between, points_at_lengths
-from warpflat.core.text import find_unused_name, other_side
+from warpflat.core import (
+    FloatArray,
+    InputError,
+    arc_lengths,
+    find_unused_name,
+    nearest,
+    other_side,
+    part_between,
+    points_at_lengths,
+)
 from warpflat.garment.construction.facings import INNER, centre_notch, facing_edges
 from warpflat.garment.construction.free_edges import free_chains, neighbour
 from warpflat.garment.construction.mark_openings import lines_inside
-from warpflat.pattern.drafting.piece_parts import Edge
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
 
 # A line ends on an edge within this distance [m].
 _ON_EDGE = 1e-3

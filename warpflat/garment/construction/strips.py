@@ -8,11 +8,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length
-from warpflat.pattern.drafting.fitting import drawn_length
-from warpflat.pattern.drafting.piece_parts import Edge
+from warpflat.core import FloatArray, InputError, arc_lengths, points_at_lengths, polyline_length
+from warpflat.pattern import Edge, drawn_length
 
 __all__ = ["CLOTH_WIDTH", "Strip", "panel_count", "strip_edges", "swept"]
 

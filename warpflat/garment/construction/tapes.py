@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.polyline import segment_lengths
-from warpflat.flat.model.wear import SKIN_LENGTH
-from warpflat.flat.surface.half_edges import half_edges_of
+from warpflat.core import FloatArray, IntArray, segment_lengths
+from warpflat.flat import SKIN_LENGTH, half_edges_of
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.forms import FormResult

@@ -15,18 +15,28 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
-from warpflat.core.output import optional_step
-from warpflat.core.polyline import polyline_length
-from warpflat.core.text import find_unused_name, quote_value
-from warpflat.flat.cutting.separate_pieces import separate
-from warpflat.flat.flattening.applied_cut import seam_kind
-from warpflat.flat.surface.border_seams import SAME_PLACE
-from warpflat.flat.surface.connectivity import border_loops, join_labels
-from warpflat.flat.surface.cut.dart import fish_eye_measure
-from warpflat.flat.surface.cut.dart_legs import are_curved, open_length, pull_back, pull_back_eye
-from warpflat.flat.surface.mirror import mirror_plane
+from warpflat.core import (
+    FloatArray,
+    InputError,
+    IntArray,
+    find_unused_name,
+    optional_step,
+    polyline_length,
+    quote_value,
+)
+from warpflat.flat import (
+    SAME_PLACE,
+    are_curved,
+    border_loops,
+    fish_eye_measure,
+    join_labels,
+    mirror_plane,
+    open_length,
+    pull_back,
+    pull_back_eye,
+    seam_kind,
+    separate,
+)
 from warpflat.garment.construction.closed_cuts import CLOSED, are_closed, close_cuts, seams_of_cuts
 from warpflat.garment.construction.darts import pleat_depths
 from warpflat.garment.construction.ease import measure_ease
@@ -44,19 +54,28 @@ from warpflat.garment.construction.openings import one_sided, place_opening
 from warpflat.garment.construction.pockets import add_pockets
 from warpflat.garment.construction.strips import CLOTH_WIDTH
 from warpflat.garment.mannequin.seam_names import name_seams
-from warpflat.pattern.drafting.curves import curve_through
-from warpflat.pattern.drafting.from_mesh import MeshFeatures, inner_stretches, line_labels, piece_from_mesh
-from warpflat.pattern.drafting.piece_parts import DEFAULT_ALLOWANCE, FOLD_STRAIGHT, Dart, Edge, Hole
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
-from warpflat.pattern.drafting.placement import default_grain
-from warpflat.pattern.drafting.seam_difference import SEAM_TOLERANCE
-from warpflat.pattern.drafting.seam_words import joint_words
+from warpflat.pattern import (
+    DEFAULT_ALLOWANCE,
+    FOLD_STRAIGHT,
+    SEAM_TOLERANCE,
+    Dart,
+    Edge,
+    Hole,
+    MeshFeatures,
+    Pattern,
+    Piece,
+    Seam,
+    SeamSide,
+    curve_through,
+    default_grain,
+    inner_stretches,
+    joint_words,
+    line_labels,
+    piece_from_mesh,
+)
 
 if TYPE_CHECKING:
-    from warpflat.flat.flattening.result import Flattening
-    from warpflat.flat.surface.border_seams import BorderSeam
-    from warpflat.flat.surface.cut.cut_mesh import Crack
-    from warpflat.flat.surface.mesh import Surface
+    from warpflat.flat import BorderSeam, Crack, Flattening, Surface
     from warpflat.garment.construction.garment import Garment
     from warpflat.garment.construction.sewn import Stitching
     from warpflat.garment.mannequin.pieces import FormPiece
@@ -496,7 +515,7 @@ def grain_of(outline: FloatArray, flat: Flattening, datum: FloatArray | None = N
         flat: the piece.
         datum: #P by 2 [m]; None if it does not lie inside the piece.
     """
-    from warpflat.flat.fabric.fabric import grain_axes
+    from warpflat.flat import grain_axes
 
     x, y = grain_axes(flat.grain_angle)[0]
     turn = np.array([[y, -x], [x, y]])

@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.sums import weighted_percentiles
+from warpflat.core import FloatArray, IntArray, weighted_percentiles
 from warpflat.garment.construction.tapes import UPRIGHT, PieceEdges, stretch_tape
 from warpflat.garment.mannequin.layout import QUARTERS
-from warpflat.pattern.export.geometry import face_areas
+from warpflat.pattern import face_areas
 
 if TYPE_CHECKING:
-    from warpflat.flat.fabric.fabric import Fabric
+    from warpflat.flat import Fabric
     from warpflat.garment.mannequin.forms import FormResult
     from warpflat.garment.mannequin.mannequin import Mannequin
 

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 import warp as wp
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.launch import launch_each
-from warpflat.flat.surface.normals import vertex_normals
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import FloatArray, IntArray, launch_each
+from warpflat.flat import triangulate, vertex_normals
 from warpflat.kernels.drape_contact import find_planes
 
 __all__ = ["SKIN", "Body"]

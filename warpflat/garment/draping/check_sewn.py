@@ -7,9 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import warp as wp
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
-from warpflat.core.errors import StepError
-from warpflat.core.launch import launch_each
+from warpflat.core import BoolArray, FloatArray, IntArray, StepError, launch_each
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.limbs import links
 from warpflat.garment.draping.openings import Opening

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
+from warpflat.core import FloatArray, InputError, IntArray
 from warpflat.garment.draping.mesh_pieces import FlatMesh, Weld
 
 __all__ = ["continue_pieces", "hang_from_edges", "hood_beside_head"]

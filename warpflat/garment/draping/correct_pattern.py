@@ -19,14 +19,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import coo_array, csc_array, diags_array
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
-from warpflat.core.short_repr import short_repr
-from warpflat.core.sparse import factor_symmetric
-from warpflat.core.sums import weighted_percentiles
-from warpflat.flat.fabric.fabric import Fabric
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.surface.triangles import corner_triangles
+from warpflat.core import FloatArray, InputError, IntArray, factor_symmetric, short_repr, weighted_percentiles
+from warpflat.flat import Fabric, Flattening, corner_triangles
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.drape_garment import held_vertices
@@ -41,7 +35,7 @@ from warpflat.garment.draping.moved_pattern import (
 from warpflat.garment.draping.relax_drape import relax_drape
 from warpflat.garment.draping.result import Drape
 from warpflat.garment.draping.sewn_cloth import SewnCloth
-from warpflat.pattern.export.geometry import outline_edges
+from warpflat.pattern import outline_edges
 
 __all__ = ["Correction", "Round", "correct_pattern", "relieve_pattern"]
 

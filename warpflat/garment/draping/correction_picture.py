@@ -7,12 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from warpflat.core.activity import report_activity
-from warpflat.core.arrays import FloatArray
+from warpflat.core import FloatArray, report_activity
 from warpflat.garment.draping.correct_pattern import Correction
-from warpflat.pattern.export.figure import new_figure, write_figure
-from warpflat.pattern.export.geometry import outline_edges
-from warpflat.pattern.export.letters import all_letters
+from warpflat.pattern import all_letters, new_figure, outline_edges, write_figure
 
 __all__ = ["write_correction_picture"]
 

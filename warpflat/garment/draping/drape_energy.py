@@ -8,14 +8,17 @@ import numpy as np
 import warp as wp
 from scipy.sparse import bsr_array, csc_array
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
-from warpflat.core.launch import Sequence, launch_each, record
-from warpflat.core.sparse import factor_symmetric
-from warpflat.core.sums import range_offsets
-from warpflat.flat.fabric.fabric import Fabric
-from warpflat.flat.model.membrane import make_cloth
-from warpflat.flat.solver.energy import Point
-from warpflat.flat.solver.metric import Solve
+from warpflat.core import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Sequence,
+    factor_symmetric,
+    launch_each,
+    range_offsets,
+    record,
+)
+from warpflat.flat import Fabric, Point, Solve, make_cloth
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.sewn_cloth import SewnCloth

@@ -9,12 +9,8 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import BoolArray
-from warpflat.core.compile import start_warp
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.text import without_side
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.surface.mesh import Surface
+from warpflat.core import BoolArray, InputError, nearest, start_warp, without_side
+from warpflat.flat import Flattening, Surface
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.draping.body import Body
@@ -23,7 +19,7 @@ from warpflat.garment.draping.relax_drape import relax_drape
 from warpflat.garment.draping.result import Drape
 from warpflat.garment.draping.sewn_cloth import SewnCloth, sew_cloth
 from warpflat.garment.mannequin.mannequin import Mannequin
-from warpflat.pattern.drafting.whole_pieces import MIRRORED
+from warpflat.pattern import MIRRORED
 
 __all__ = ["drape", "held_vertices", "hip_level", "thread_elastics"]
 

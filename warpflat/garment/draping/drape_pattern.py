@@ -11,15 +11,8 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.compile import start_warp
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.polyline import polyline_length
-from warpflat.core.short_repr import short_repr
-from warpflat.flat.fabric.fabric import Fabric
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.mirror import mirror_plane
-from warpflat.flat.surface.normals import vertex_normals
+from warpflat.core import FloatArray, InputError, IntArray, nearest, polyline_length, short_repr, start_warp
+from warpflat.flat import Fabric, Surface, mirror_plane, vertex_normals
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.check_sewn import check_sewn
 from warpflat.garment.draping.continue_pieces import continue_pieces, hang_from_edges, hood_beside_head
@@ -38,9 +31,7 @@ from warpflat.garment.draping.thin_body import ThinBody, draw_out_limbs
 from warpflat.garment.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
 from warpflat.garment.mannequin.head import head_of
 from warpflat.garment.mannequin.mannequin import Mannequin
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
-from warpflat.pattern.drafting.sewing_tasks import is_flounce
-from warpflat.pattern.drafting.whole_pieces import MIRRORED, whole_pieces
+from warpflat.pattern import MIRRORED, Pattern, Piece, Seam, SeamSide, is_flounce, whole_pieces
 
 __all__ = ["Placement", "drape_pattern", "lay_pieces", "place_drafted"]
 

@@ -10,27 +10,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.output import latest_file
-from warpflat.core.sums import weighted_percentile
-from warpflat.flat.surface.normals import area_vectors, mean_normals
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import FloatArray, IntArray, latest_file, weighted_percentile
+from warpflat.flat import area_vectors, mean_normals, triangulate
 from warpflat.garment.draping.body import SKIN
 from warpflat.garment.draping.result import Drape
-from warpflat.pattern.export.colours import energy_colours, linear_rgb
-from warpflat.pattern.export.figure import write_moving_picture
-from warpflat.pattern.export.geometry import corner_mean
-from warpflat.pattern.export.raster import Lighting, rasterise, shade
-from warpflat.pattern.export.usd_prims import (
+from warpflat.pattern import (
+    Lighting,
     begin_stage,
+    corner_mean,
     define_group,
     define_mesh,
+    energy_colours,
     export_stage,
     last_values_as_defaults,
+    linear_rgb,
     part_path,
+    rasterise,
     set_face_map,
     set_points,
+    shade,
     usd_errors,
+    write_moving_picture,
 )
 
 __all__ = ["choose_frames", "write_drape_film", "write_drape_frames"]

@@ -17,10 +17,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import polyline_length
-from warpflat.core.sparse import factor_symmetric
+from warpflat.core import BoolArray, FloatArray, InputError, IntArray, factor_symmetric, polyline_length
 from warpflat.garment.draping.openings import Opening
 from warpflat.garment.draping.sew_around import AsRigid
 from warpflat.garment.draping.sewn_cloth import SewnCloth

@@ -8,11 +8,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
-from warpflat.core.input_files import FARTHEST, reading
-from warpflat.pattern.drafting.pieces import Piece
-from warpflat.pattern.drafting.whole_pieces import MIRRORED
+from warpflat.core import FARTHEST, FloatArray, InputError, IntArray, reading
+from warpflat.pattern import MIRRORED, Piece
 
 __all__ = ["Lift", "moved_lift", "read_lift", "surface_lift", "whole_lifts"]
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.core import BoolArray, FloatArray
 from warpflat.garment.mannequin.mannequin import Mannequin
 
 __all__ = ["limb_lines", "links", "on_arm"]

@@ -9,15 +9,10 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import points_at_lengths
-from warpflat.flat.surface.connectivity import join_labels
+from warpflat.core import FloatArray, InputError, IntArray, points_at_lengths
+from warpflat.flat import join_labels
 from warpflat.garment.draping.worn_layer import Button
-from warpflat.pattern.drafting.piece_parts import Edge
-from warpflat.pattern.drafting.pieces import Piece, Seam
-from warpflat.pattern.drafting.seam_difference import eased_length
-from warpflat.pattern.drafting.whole_pieces import hole_edges
+from warpflat.pattern import Edge, Piece, Seam, eased_length, hole_edges
 
 __all__ = ["FlatMesh", "mesh_pieces", "sewn_places", "welded_vertices"]
 

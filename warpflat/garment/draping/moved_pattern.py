@@ -8,14 +8,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.surface.triangles import corner_triangles
+from warpflat.core import FloatArray, IntArray
+from warpflat.flat import Flattening, corner_triangles
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.draping.sewn_cloth import SewnCloth
-from warpflat.pattern.drafting.pieces import Pattern, Piece
-from warpflat.pattern.drafting.whole_pieces import MIRRORED
-from warpflat.pattern.export.geometry import outline_edges
+from warpflat.pattern import MIRRORED, Pattern, Piece, outline_edges
 
 __all__ = ["edge_lengths", "largest_share", "moved_outlines", "pieces_of", "seam_edges", "seam_rows", "with_pattern"]
 

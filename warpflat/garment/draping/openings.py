@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core.arrays import IntArray
-from warpflat.core.errors import InputError
-from warpflat.flat.surface.connectivity import border_loops, orient
+from warpflat.core import InputError, IntArray
+from warpflat.flat import border_loops, orient
 from warpflat.garment.draping.mesh_pieces import FlatMesh, Weld, welded_vertices
 
 __all__ = ["Opening", "find_openings"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from warpflat.core.errors import InputError, is_number
+from warpflat.core import InputError, is_number
 
 __all__ = ["DrapeOptions"]
 

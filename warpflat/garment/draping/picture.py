@@ -11,17 +11,26 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
-from warpflat.core.activity import report_activity
-from warpflat.core.arrays import FloatArray
-from warpflat.core.sums import weighted_percentile
+from warpflat.core import FloatArray, report_activity, weighted_percentile
 from warpflat.garment.draping.body import SKIN
 from warpflat.garment.draping.result import Drape
-from warpflat.pattern.export.colours import on_cloth
-from warpflat.pattern.export.figure import GREY, PAGE_WIDTH, Pen, new_figure, write_figure
-from warpflat.pattern.export.geometry import outline_edges
-from warpflat.pattern.export.letters import all_letters
-from warpflat.pattern.export.picture_garment import Body, crop_body
-from warpflat.pattern.export.picture_views import SIDES, DrawnView, Facets, make_facets, view_from_side
+from warpflat.pattern import (
+    GREY,
+    PAGE_WIDTH,
+    SIDES,
+    Body,
+    DrawnView,
+    Facets,
+    Pen,
+    all_letters,
+    crop_body,
+    make_facets,
+    new_figure,
+    on_cloth,
+    outline_edges,
+    view_from_side,
+    write_figure,
+)
 
 __all__ = ["write_compared_drapes", "write_drape_picture"]
 

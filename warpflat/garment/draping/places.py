@@ -8,11 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
-from warpflat.flat.fabric.limits import Demand
-from warpflat.flat.surface.connectivity import join_labels
-from warpflat.flat.surface.half_edges import border_edges
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import BoolArray, FloatArray, IntArray
+from warpflat.flat import Demand, border_edges, join_labels, triangulate
 from warpflat.garment.draping.sewn_cloth import SewnCloth
 
 __all__ = ["Place", "find_places"]

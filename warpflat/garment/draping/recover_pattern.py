@@ -20,12 +20,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import block_array, coo_array, csc_array, csr_array, diags_array
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
-from warpflat.core.errors import InputError
-from warpflat.core.short_repr import short_repr
-from warpflat.core.sparse import factor_symmetric
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.surface.triangles import corner_triangles
+from warpflat.core import BoolArray, FloatArray, InputError, IntArray, factor_symmetric, short_repr
+from warpflat.flat import Flattening, corner_triangles
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.draping.drape_energy import DrapeEnergy
 from warpflat.garment.draping.drape_garment import held_vertices

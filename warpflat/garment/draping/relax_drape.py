@@ -20,10 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.errors import StepError
-from warpflat.core.launch import Sequence, record
-from warpflat.flat.solver.minimise import Descent
+from warpflat.core import BoolArray, FloatArray, Sequence, StepError, record
+from warpflat.flat import Descent
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.drape_energy import DrapeEnergy
 from warpflat.garment.draping.options import DrapeOptions

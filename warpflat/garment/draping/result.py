@@ -12,14 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
-from warpflat.core.short_repr import short_repr
-from warpflat.core.sums import weighted_percentiles
-from warpflat.flat.fabric.limits import Demand
-from warpflat.flat.model.fit import TOUCHING
-from warpflat.flat.model.strain import shear_angles
-from warpflat.flat.surface.normals import vertex_normals
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import BoolArray, FloatArray, IntArray, short_repr, weighted_percentiles
+from warpflat.flat import TOUCHING, Demand, shear_angles, triangulate, vertex_normals
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.places import Place, find_places

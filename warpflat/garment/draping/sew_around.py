@@ -10,8 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_array, diags_array
 
-from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.sparse import factor_symmetric
+from warpflat.core import BoolArray, FloatArray, factor_symmetric
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.sewn_cloth import SewnCloth
 from warpflat.garment.draping.thin_body import ThinBody

@@ -8,16 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
-from warpflat.flat.fabric.fabric import Fabric, grain_axes
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.surface.connectivity import join_labels
-from warpflat.flat.surface.triangles import corner_triangles
+from warpflat.core import FloatArray, InputError, IntArray
+from warpflat.flat import Fabric, Flattening, corner_triangles, grain_axes, join_labels
 from warpflat.garment.construction.darts import dart_pairs
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.garment import Garment
-from warpflat.pattern.export.geometry import outline_edges
+from warpflat.pattern import outline_edges
 
 __all__ = ["SewnCloth", "sew_cloth"]
 

@@ -11,9 +11,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.spatial import cKDTree
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
-from warpflat.flat.surface.connectivity import border_loops
-from warpflat.flat.surface.normals import vertex_normals
+from warpflat.core import BoolArray, FloatArray, IntArray
+from warpflat.flat import border_loops, vertex_normals
 from warpflat.garment.draping.body import Body
 
 __all__ = ["ThinBody", "draw_out_limbs"]

@@ -13,11 +13,8 @@ import numpy as np
 from shapely import Point, Polygon, contains_xy
 from shapely.ops import nearest_points
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import nearest_on_polyline
-from warpflat.pattern.drafting.piece_parts import Edge
-from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
-from warpflat.pattern.drafting.whole_pieces import MIRRORED, hole_edges, turn_over
+from warpflat.core import FloatArray, nearest_on_polyline
+from warpflat.pattern import MIRRORED, Edge, Piece, Seam, SeamSide, hole_edges, turn_over
 
 __all__ = ["Button", "closures", "in_one_layer", "right_side_out", "turned_down"]
 

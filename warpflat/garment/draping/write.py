@@ -6,13 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from warpflat.core.output import file_in, latest_file, optional_file, output_folder
-from warpflat.flat.surface.mesh import Surface
+from warpflat.core import file_in, latest_file, optional_file, output_folder
+from warpflat.flat import Surface
 from warpflat.garment.draping.frames import write_drape_film, write_drape_frames
 from warpflat.garment.draping.picture import write_drape_picture
 from warpflat.garment.draping.result import Drape
-from warpflat.pattern.export.obj import write_obj
-from warpflat.pattern.export.sewn_usd import write_sewn_usd
+from warpflat.pattern import write_obj, write_sewn_usd
 
 __all__ = ["save_drape", "write_drape_files"]
 

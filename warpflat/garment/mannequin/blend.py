@@ -15,10 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.polyline import arc_lengths, polyline_length
-from warpflat.flat.surface.normals import vertex_normals
+from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest, polyline_length
+from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS, RING_LEVELS, Layout
 from warpflat.garment.mannequin.profiles import convex_girth, scale_to_girth
 from warpflat.garment.mannequin.sheet import fill_fork, sheet_laplacian

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core import FloatArray
 
 __all__ = ["ArmCurves", "Blueprint", "LegCurves", "LegProfile", "Profile", "QuarterCurves"]
 

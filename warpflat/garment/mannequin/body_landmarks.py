@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.core import BoolArray, FloatArray
 from warpflat.garment.mannequin.body_model import BodyModel, finer_body
 
 __all__ = [

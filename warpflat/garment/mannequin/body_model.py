@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core import FloatArray
 
 __all__ = ["BodyModel", "Person", "finer_body", "rotation", "rotation_vector"]
 

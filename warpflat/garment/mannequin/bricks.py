@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import IntArray
-from warpflat.core.errors import InputError, nearest
+from warpflat.core import InputError, IntArray, nearest
 from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS, RING_LEVELS, Layout
 
 __all__ = ["TRUNK_LEVELS", "Brick", "brick", "select_bricks"]

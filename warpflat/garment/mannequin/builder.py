@@ -6,8 +6,7 @@ import itertools
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.polyline import arc_lengths, polyline_length, resample
+from warpflat.core import FloatArray, IntArray, arc_lengths, polyline_length, resample
 from warpflat.garment.mannequin.blueprint import Blueprint, LegCurves, LegProfile, Profile
 from warpflat.garment.mannequin.layout import LEG_LEVELS, QUARTERS, RING_LEVELS, Layout
 from warpflat.garment.mannequin.profiles import convex_girth, scale_to_girth

@@ -10,12 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.patches import Circle
 
-from warpflat.core.arrays import IntArray
+from warpflat.core import IntArray
 from warpflat.garment.mannequin.bricks import TRUNK_LEVELS
 from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS
-from warpflat.pattern.export.figure import GREY, Pen, new_figure, write_figure
-from warpflat.pattern.export.letters import all_letters
-from warpflat.pattern.export.picture_views import DrawnView, make_facets, view_from_side
+from warpflat.pattern import GREY, DrawnView, Pen, all_letters, make_facets, new_figure, view_from_side, write_figure
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.mannequin import Mannequin

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray
-from warpflat.flat.surface.closest import nearest_on_triangles
+from warpflat.core import FloatArray
+from warpflat.flat import nearest_on_triangles
 
 __all__ = ["Closest"]
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import FloatArray
+from warpflat.flat import triangulate
 from warpflat.garment.mannequin.body_landmarks import model_places, near_level, value_at
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body
 from warpflat.garment.mannequin.fit_body import Mesh, fit_body

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from warpflat.core.errors import InputError, is_number, nearest
-from warpflat.core.text import quote_value
+from warpflat.core import InputError, is_number, nearest, quote_value
 from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS, RING_LEVELS
 
 __all__ = ["EASE_PRESETS", "ease_from"]

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core import FloatArray
 from warpflat.garment.mannequin.darts import FormDart
 from warpflat.garment.mannequin.layout import Layout
 

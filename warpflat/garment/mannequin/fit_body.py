@@ -15,9 +15,8 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.compile import launch_quietly
-from warpflat.flat.surface.normals import vertex_normals
+from warpflat.core import FloatArray, launch_quietly
+from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.body_landmarks import PLACES, height_weights
 from warpflat.garment.mannequin.body_model import BodyModel, Person, rotation
 from warpflat.kernels.closest import find_closest

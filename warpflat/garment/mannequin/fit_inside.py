@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray
-from warpflat.flat.surface.normals import vertex_normals
+from warpflat.core import FloatArray
+from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.body_model import BodyModel, Person, rotation
 from warpflat.garment.mannequin.fit_body import FittedBody, Mesh
 

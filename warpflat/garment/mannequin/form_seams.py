@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core.arrays import IntArray
+from warpflat.core import IntArray
 from warpflat.garment.mannequin.pieces import FormPiece
 from warpflat.garment.mannequin.seam_names import name_seams
 

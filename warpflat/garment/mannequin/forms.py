@@ -11,11 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.file_names import check_file_name, same_file
-from warpflat.core.short_repr import short_repr
-from warpflat.core.text import quote_value
+from warpflat.core import FloatArray, InputError, IntArray, check_file_name, nearest, quote_value, same_file, short_repr
 from warpflat.garment.mannequin.blend import Adjustment, adjusted_vertices, blend_forms, is_tight
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.darts import FormDart, PlacedDart, place_darts

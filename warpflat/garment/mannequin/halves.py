@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-from warpflat.core.errors import InputError
+from warpflat.core import InputError
 
 __all__ = ["check_halves", "fold_among", "is_side", "lies_on_both"]
 

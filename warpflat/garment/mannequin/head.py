@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.flat.surface.connectivity import border_loops
+from warpflat.core import FloatArray, IntArray
+from warpflat.flat import border_loops
 from warpflat.garment.mannequin.body_landmarks import LEVELS, model_places, near_level
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.profiles import convex_girth

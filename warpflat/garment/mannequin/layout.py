@@ -19,9 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import IntArray
-from warpflat.core.errors import InputError
-from warpflat.core.short_repr import short_repr
+from warpflat.core import InputError, IntArray, short_repr
 
 __all__ = ["ARM_LEVELS", "LEG_LEVELS", "LEG_LINES", "QUARTERS", "RING_LEVELS", "Layout", "make_layout"]
 

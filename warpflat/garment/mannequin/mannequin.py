@@ -10,11 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.polyline import polyline_length
-from warpflat.core.short_repr import short_repr
-from warpflat.flat.surface.mesh import Surface
+from warpflat.core import FloatArray, InputError, nearest, polyline_length, short_repr
+from warpflat.flat import Surface
 from warpflat.garment.mannequin.bricks import Brick, brick, select_bricks
 from warpflat.garment.mannequin.builder import build_trunk, build_vertices
 from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LINES, RING_LEVELS, Layout, make_layout

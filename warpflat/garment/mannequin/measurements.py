@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core.errors import InputError, expect, is_number, nearest
+from warpflat.core import InputError, expect, is_number, nearest
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -9,10 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths, nearest_on_polyline, points_at_lengths
-from warpflat.flat.surface.normals import vertex_normals
+from warpflat.core import (
+    BoolArray,
+    FloatArray,
+    InputError,
+    IntArray,
+    arc_lengths,
+    nearest_on_polyline,
+    points_at_lengths,
+)
+from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.closest import Closest
 from warpflat.garment.mannequin.layout import Layout
 from warpflat.garment.mannequin.sheet import sheet_laplacian

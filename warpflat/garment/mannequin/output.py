@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpflat._version import __version__
-from warpflat.core.output import atomic_path, optional_file, output_folder, require_own_metrics, write_report
+from warpflat.core import atomic_path, optional_file, output_folder, require_own_metrics, write_report
 from warpflat.garment.mannequin.picture import write_distance_picture, write_mannequin_picture
 from warpflat.garment.mannequin.usd import write_mannequin_usd
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.flat.surface.normals import vertex_normals
+from warpflat.core import FloatArray, IntArray
+from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.closest import Closest
 from warpflat.garment.mannequin.layout import Layout
 

@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.flat.surface.connectivity import join_labels
+from warpflat.core import FloatArray, InputError, IntArray, nearest
+from warpflat.flat import join_labels
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.darts import FormDart, place_darts
 from warpflat.garment.mannequin.forms import Form, PieceRecipe

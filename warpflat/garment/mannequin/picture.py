@@ -10,14 +10,22 @@ from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
-from warpflat.core.arrays import FloatArray
-from warpflat.flat.surface.normals import vertex_normals
+from warpflat.core import FloatArray
+from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.closest import Closest
 from warpflat.garment.mannequin.layout import LEG_LINES, RING_LEVELS
-from warpflat.pattern.drafting.placement import space_out
-from warpflat.pattern.export.figure import INK, Pen, new_figure, write_figure
-from warpflat.pattern.export.letters import all_letters
-from warpflat.pattern.export.picture_views import SIDES, DrawnView, make_facets, view_from_side
+from warpflat.pattern import (
+    INK,
+    SIDES,
+    DrawnView,
+    Pen,
+    all_letters,
+    make_facets,
+    new_figure,
+    space_out,
+    view_from_side,
+    write_figure,
+)
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.mannequin import Mannequin

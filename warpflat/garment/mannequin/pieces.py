@@ -11,12 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.short_repr import short_repr
-from warpflat.core.text import find_unused_name
-from warpflat.flat.surface.connectivity import join_labels
-from warpflat.flat.surface.mesh import Surface
+from warpflat.core import FloatArray, InputError, IntArray, find_unused_name, nearest, short_repr
+from warpflat.flat import Surface, join_labels
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.halves import check_halves, fold_among, is_side, lies_on_both
 from warpflat.garment.mannequin.layout import Layout

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import resample
+from warpflat.core import FloatArray, InputError, resample
 
 __all__ = ["Section", "convex_girth", "scale_to_girth", "section_curve", "superellipse_exponent"]  # fmt: skip
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
+from warpflat.core import FloatArray, InputError
 
 __all__ = ["ray_radii"]
 

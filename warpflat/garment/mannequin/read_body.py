@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
+from warpflat.core import FloatArray, InputError
 from warpflat.garment.mannequin.body_landmarks import LEVELS
 from warpflat.garment.mannequin.scan_levels import ScanLevel, find_levels
 from warpflat.garment.mannequin.scan_pose import LEVELS_UP, ScanOptions, turn_scan_upright

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import arc_lengths
-from warpflat.flat.surface.normals import vertex_normals
+from warpflat.core import FloatArray, arc_lengths
+from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.blueprint import Blueprint, Profile
 from warpflat.garment.mannequin.closest import Closest
 from warpflat.garment.mannequin.layout import RING_LEVELS, Layout

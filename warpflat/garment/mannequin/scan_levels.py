@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
+from warpflat.core import FloatArray, InputError
 from warpflat.garment.mannequin.body_landmarks import near_level, value_at
 from warpflat.garment.mannequin.scan_pose import LEVELS_UP
 from warpflat.garment.mannequin.scan_sections import OUTLINES, BodySections, smooth

@@ -6,9 +6,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths, polyline_length, resample
+from warpflat.core import FloatArray, InputError, arc_lengths, polyline_length, resample
 from warpflat.garment.mannequin.blueprint import ArmCurves, LegCurves, LegProfile, Profile, QuarterCurves
 from warpflat.garment.mannequin.closest import Closest
 from warpflat.garment.mannequin.layout import LEG_LEVELS, QUARTERS

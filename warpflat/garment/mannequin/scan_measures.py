@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
+from warpflat.core import FloatArray, InputError
 from warpflat.garment.mannequin.body_landmarks import ARM_PLACES, model_places, near_level, near_place
 from warpflat.garment.mannequin.body_model import finer_body
 from warpflat.garment.mannequin.measurements import size_tables

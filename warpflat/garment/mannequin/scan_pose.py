@@ -9,10 +9,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.flat.surface.connectivity import join_labels
-from warpflat.flat.surface.repair.stray_vertex import stray_vertex, stray_words
+from warpflat.core import FloatArray, InputError, nearest
+from warpflat.flat import join_labels, stray_vertex, stray_words
 from warpflat.garment.mannequin.scan_repair import close_holes, smooth_noise, turned_outward
 from warpflat.garment.mannequin.slicer import Slicer
 from warpflat.garment.mannequin.summit import summit

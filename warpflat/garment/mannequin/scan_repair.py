@@ -8,10 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.errors import InputError
-from warpflat.flat.surface.connectivity import components, orient
-from warpflat.flat.surface.half_edges import half_edges
+from warpflat.core import BoolArray, FloatArray, InputError
+from warpflat.flat import components, half_edges, orient
 
 __all__ = ["close_holes", "smooth_noise", "turned_outward"]
 

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths
+from warpflat.core import BoolArray, FloatArray, InputError, arc_lengths
 from warpflat.garment.mannequin.body_landmarks import ARM_PLACES, model_places, near_place, value_at
 from warpflat.garment.mannequin.body_model import finer_body
 from warpflat.garment.mannequin.profiles import convex_girth

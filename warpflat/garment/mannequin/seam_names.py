@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.text import find_unused_name
+from warpflat.core import FloatArray, find_unused_name
 from warpflat.garment.mannequin.layout import RING_LEVELS
 
 __all__ = ["name_seams"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core import FloatArray
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.darts import standard_darts
 from warpflat.garment.mannequin.elbow_darts import elbow_darts

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core import FloatArray, IntArray
 from warpflat.garment.mannequin.layout import LEG_LEVELS, Layout
 
 __all__ = ["fill_fork", "sheet_laplacian"]

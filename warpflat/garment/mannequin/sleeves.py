@@ -8,9 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths, points_at_lengths
+from warpflat.core import FloatArray, InputError, arc_lengths, points_at_lengths
 from warpflat.garment.mannequin.layout import Layout
 
 __all__ = [

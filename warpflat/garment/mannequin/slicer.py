@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core import FloatArray
 
 __all__ = ["Slice", "Slicer"]
 

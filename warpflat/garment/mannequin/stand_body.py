@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.flat.surface.normals import vertex_normals
+from warpflat.core import BoolArray, FloatArray
+from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.body_landmarks import LEVELS, crotch_vertex, meeting, model_places, near_level, value_at
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation, rotation_vector
 from warpflat.garment.mannequin.fit_body import FittedBody, Mesh, fit_body

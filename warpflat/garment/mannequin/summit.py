@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core import FloatArray
 
 __all__ = ["summit"]
 

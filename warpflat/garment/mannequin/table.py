@@ -9,11 +9,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from warpflat.core.errors import InputError
-from warpflat.core.input_files import listening_to_reads
-from warpflat.core.text import MADE_TO_MEASURE
-from warpflat.core.toml_file import Table
-from warpflat.flat.surface.io.read import read_scan
+from warpflat.core import MADE_TO_MEASURE, InputError, Table, listening_to_reads
+from warpflat.flat import read_scan
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.measurements import size_table
 from warpflat.garment.mannequin.scan_pose import ScanOptions

@@ -8,9 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths, polyline_length, resample
+from warpflat.core import FloatArray, InputError, arc_lengths, polyline_length, resample
 from warpflat.garment.mannequin.blueprint import ArmCurves, Blueprint, Profile, QuarterCurves
 from warpflat.garment.mannequin.layout import QUARTERS, RING_LEVELS
 from warpflat.garment.mannequin.measurements import Measurements, size_tables

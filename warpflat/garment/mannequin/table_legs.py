@@ -8,8 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import arc_lengths, polyline_length, resample
+from warpflat.core import FloatArray, arc_lengths, polyline_length, resample
 from warpflat.garment.mannequin.blueprint import LegCurves, LegProfile, Profile
 from warpflat.garment.mannequin.layout import LEG_LEVELS, LEG_LINES
 from warpflat.garment.mannequin.measurements import Measurements

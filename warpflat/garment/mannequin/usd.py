@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core.output import require_writable
-from warpflat.flat.surface.normals import vertex_normals
-from warpflat.pattern.export.usd_prims import (
+from warpflat.core import require_writable
+from warpflat.flat import vertex_normals
+from warpflat.pattern import (
     begin_stage,
     bounding_box,
     define_group,

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from warpflat.core.arrays import FloatArray
-from warpflat.flat.surface.connectivity import border_loops, components, euler_characteristic
-from warpflat.flat.surface.half_edges import mesh_edges
+from warpflat.core import FloatArray
+from warpflat.flat import border_loops, components, euler_characteristic, mesh_edges
 from warpflat.garment.seams.cloth import Cloth, section
 from warpflat.garment.seams.fields import MirrorMap, Operators, mirror_map
 
@@ -766,7 +765,7 @@ def _fork(points: FloatArray, upward: FloatArray, size: float) -> tuple[FloatArr
     Returns:
         The place, the direction, the length from the first point to the place [m], and the cosine of the angle between both legs.
     """
-    from warpflat.core.polyline import arc_lengths, points_at_lengths
+    from warpflat.core import arc_lengths, points_at_lengths
 
     arc = arc_lengths(points)
     total = float(arc[-1])

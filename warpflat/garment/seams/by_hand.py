@@ -13,14 +13,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths, points_at_lengths, project_on_segments
-from warpflat.core.text import quote_value
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.paths.edge_paths import are_joined
-from warpflat.flat.surface.paths.section import plane_sections
-from warpflat.flat.surface.paths.trace import SurfacePath, geodesic_path, locate, polyline_path
+from warpflat.core import FloatArray, InputError, arc_lengths, points_at_lengths, project_on_segments, quote_value
+from warpflat.flat import Surface, SurfacePath, are_joined, geodesic_path, locate, plane_sections, polyline_path
 from warpflat.garment.seams.anatomy import Anatomy
 from warpflat.garment.seams.cloth import Cloth, edge_components, section
 from warpflat.garment.seams.options import SeamCut, SeamOptions, in_family

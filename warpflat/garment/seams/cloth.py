@@ -14,14 +14,19 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.polyline import project_on_segments
-from warpflat.flat.surface.connectivity import border_loops, components, join_labels
-from warpflat.flat.surface.cut.split_faces import split_faces_along
-from warpflat.flat.surface.half_edges import HalfEdges, half_edges
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.normals import area_vectors, face_normals
-from warpflat.flat.surface.paths.trace import SurfacePath
+from warpflat.core import BoolArray, FloatArray, project_on_segments
+from warpflat.flat import (
+    HalfEdges,
+    Surface,
+    SurfacePath,
+    area_vectors,
+    border_loops,
+    components,
+    face_normals,
+    half_edges,
+    join_labels,
+    split_faces_along,
+)
 
 __all__ = ["Cloth", "PieceMesh", "edge_components", "section"]
 

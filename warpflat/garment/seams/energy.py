@@ -13,20 +13,28 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from warpflat.core.activity import report_activity
-from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.beside import two_at_a_time
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths, points_at_lengths
-from warpflat.core.text import find_unused_name
-from warpflat.flat.fabric.fabric import Fabric
-from warpflat.flat.flattening.flatten_piece import flatten
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.solver.options import RelaxOptions, coarse_options
-from warpflat.flat.surface.as_rigid import as_rigid_layout
-from warpflat.flat.surface.connectivity import border_loops, euler_characteristic
-from warpflat.flat.surface.injective import is_injective
-from warpflat.flat.surface.mesh import Surface
+from warpflat.core import (
+    BoolArray,
+    FloatArray,
+    InputError,
+    arc_lengths,
+    find_unused_name,
+    points_at_lengths,
+    report_activity,
+    two_at_a_time,
+)
+from warpflat.flat import (
+    Fabric,
+    Flattening,
+    RelaxOptions,
+    Surface,
+    as_rigid_layout,
+    border_loops,
+    coarse_options,
+    euler_characteristic,
+    flatten,
+    is_injective,
+)
 from warpflat.garment.construction.sew_pieces import sew_pieces
 from warpflat.garment.seams.anatomy import ROLES, Anatomy
 from warpflat.garment.seams.by_hand import level_of
@@ -931,7 +939,7 @@ def _cut(cloth: Cloth, mesh: PieceMesh, candidate: _Candidate, name: str) -> Clo
 
 def _reached_within(cloth: Cloth, allowed: BoolArray, start: FloatArray) -> BoolArray:
     """Return #F, the allowed faces that hang together with the one nearest to a place."""
-    from warpflat.flat.surface.connectivity import components
+    from warpflat.flat import components
 
     chosen = np.flatnonzero(allowed)
     found = np.zeros(len(cloth.faces), dtype=bool)

@@ -9,10 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, csr_array, diags_array
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.sparse import factor_symmetric
-from warpflat.flat.surface.closest import nearest_on_triangles
-from warpflat.flat.surface.normals import area_vectors, face_normals, vertex_normals
+from warpflat.core import FloatArray, factor_symmetric
+from warpflat.flat import area_vectors, face_normals, nearest_on_triangles, vertex_normals
 
 __all__ = ["MirrorMap", "Operators", "mirror_map"]
 

@@ -9,18 +9,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError, expect
-from warpflat.core.polyline import polyline_length
-from warpflat.core.short_repr import short_repr
-from warpflat.core.text import find_unused_name, format_count
-from warpflat.flat.fabric.fabric import Fabric
-from warpflat.flat.fabric.library import as_fabric
-from warpflat.flat.surface.connectivity import border_loops, euler_characteristic
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.paths.lines import line_from_curve, line_on_plane
-from warpflat.flat.surface.paths.section import plane_sections
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import FloatArray, InputError, expect, find_unused_name, format_count, polyline_length, short_repr
+from warpflat.flat import (
+    Fabric,
+    Surface,
+    as_fabric,
+    border_loops,
+    euler_characteristic,
+    line_from_curve,
+    line_on_plane,
+    plane_sections,
+    triangulate,
+)
 from warpflat.garment.seams.anatomy import HOLE, ROLES, Anatomy, averaged_limbs, axis_name, describe, find_anatomy
 from warpflat.garment.seams.by_hand import HAND, cut_by_hand, join_ends, keep_seams, leave_to_hand
 from warpflat.garment.seams.cloth import Cloth, PieceMesh
@@ -32,7 +32,7 @@ from warpflat.garment.seams.solid import is_panel, part_solids
 from warpflat.garment.seams.symmetric import averaged, mirrored
 from warpflat.garment.seams.tailor import FACING, TAILORED, cut_as_a_tailor, draw_fields, side_word, with_drawn_sleeves
 from warpflat.garment.seams.thickness import without_thickness
-from warpflat.pattern.drafting.piece_parts import FoundSeam
+from warpflat.pattern import FoundSeam
 
 __all__ = ["GRAIN", "FoundSeams", "find_seams", "seam_words"]
 

@@ -9,15 +9,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from warpflat.core.errors import InputError
-from warpflat.core.file_names import make_file_name, plain_label
-from warpflat.core.text import area_words, format_count, quote_value
-from warpflat.flat.surface.connectivity import euler_characteristic
-from warpflat.flat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file, wrong_size
-from warpflat.flat.surface.io.usd_stage import ALL_PRIMS
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.repair.layers import Layer, surplus_faces, surplus_layers
-from warpflat.flat.surface.repair.validate import make_surface, parts_of_faces
+from warpflat.core import InputError, area_words, format_count, make_file_name, plain_label, quote_value
+from warpflat.flat import (
+    ALL_PRIMS,
+    POSSIBLE,
+    Layer,
+    RawMesh,
+    Surface,
+    check_size,
+    euler_characteristic,
+    make_surface,
+    parts_of_faces,
+    read_mesh_file,
+    surplus_faces,
+    surplus_layers,
+    wrong_size,
+)
 from warpflat.garment.seams.options import SeamCut
 
 __all__ = ["GarmentFile", "read_garment", "read_layers"]
@@ -155,6 +162,6 @@ def _is_body(surface: Surface, others: Sequence[Surface]) -> bool:
 
 
 def _is_closed(surface: Surface) -> bool:
-    from warpflat.flat.surface.connectivity import border_of
+    from warpflat.flat import border_of
 
     return len(border_of(surface)) == 0

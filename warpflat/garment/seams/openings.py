@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.text import find_unused_name
-from warpflat.flat.surface.connectivity import border_loops
-from warpflat.flat.surface.tubes import tube_borders
+from warpflat.core import find_unused_name
+from warpflat.flat import border_loops, tube_borders
 from warpflat.garment.seams.anatomy import Anatomy
 from warpflat.garment.seams.cloth import Cloth, PieceMesh, edge_components
 from warpflat.garment.seams.options import SeamOptions

@@ -9,9 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError, is_number, nearest
-from warpflat.core.text import quote_value
+from warpflat.core import FloatArray, InputError, is_number, nearest, quote_value
 
 __all__ = ["DIRECTIONS", "FAMILIES", "SeamCut", "SeamOptions", "in_family"]
 

@@ -27,10 +27,8 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.flat.surface.connectivity import border_loops, euler_characteristic
-from warpflat.flat.surface.half_edges import half_edges
-from warpflat.flat.surface.tubes import inner_borders, tube_borders
+from warpflat.core import FloatArray, IntArray
+from warpflat.flat import border_loops, euler_characteristic, half_edges, inner_borders, tube_borders
 from warpflat.garment.seams.anatomy import HOLE, Anatomy
 from warpflat.garment.seams.cloth import Cloth, PieceMesh, section
 from warpflat.garment.seams.fields import Operators

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray
-from warpflat.flat.surface.connectivity import border_loops, euler_characteristic
+from warpflat.core import FloatArray
+from warpflat.flat import border_loops, euler_characteristic
 from warpflat.garment.seams.anatomy import Anatomy
 from warpflat.garment.seams.cloth import Cloth, edge_components
 from warpflat.garment.seams.fields import Operators

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.flat.surface.connectivity import components
+from warpflat.core import BoolArray, FloatArray
+from warpflat.flat import components
 from warpflat.garment.seams.anatomy import Anatomy, Limb
 from warpflat.garment.seams.cloth import Cloth, edge_components, section
 from warpflat.garment.seams.fields import Operators

@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from warpflat.core.arrays import BoolArray
-from warpflat.core.text import format_count
-from warpflat.flat.surface.connectivity import join_labels
+from warpflat.core import BoolArray, format_count
+from warpflat.flat import join_labels
 from warpflat.garment.seams.cloth import Cloth
 from warpflat.garment.seams.fields import Operators
 

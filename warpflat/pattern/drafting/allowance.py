@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
+from warpflat.core import FloatArray, InputError
 from warpflat.pattern.drafting.dart_allowance import dart_allowance
 from warpflat.pattern.drafting.hem_allowance import find_hem_end, fold_hem
 from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IndexArray
+from warpflat.core import FloatArray, IndexArray
 
 __all__ = ["find_corners", "find_cracks"]
 

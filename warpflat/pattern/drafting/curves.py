@@ -8,8 +8,15 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length, segment_lengths, turning_angles
+from warpflat.core import (
+    BoolArray,
+    FloatArray,
+    arc_lengths,
+    points_at_lengths,
+    polyline_length,
+    segment_lengths,
+    turning_angles,
+)
 
 __all__ = [
     "Curve",

@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths
+from warpflat.core import FloatArray, InputError, arc_lengths
 from warpflat.pattern.drafting.hem_allowance import HEM_SLANT
 from warpflat.pattern.drafting.polygons import (
     GRID,

@@ -12,10 +12,7 @@ from itertools import chain
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.output import optional_step
-from warpflat.core.polyline import arc_lengths
+from warpflat.core import FloatArray, InputError, arc_lengths, optional_step
 from warpflat.pattern.drafting.allowance import cut_hole, cut_outline
 from warpflat.pattern.drafting.curves import TOLERANCE, Curve
 from warpflat.pattern.drafting.drafted import (

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length
-from warpflat.core.short_repr import short_repr
+from warpflat.core import FloatArray, arc_lengths, points_at_lengths, polyline_length, short_repr
 from warpflat.pattern.drafting.curves import Curve
 from warpflat.pattern.drafting.label import Label
 from warpflat.pattern.drafting.piece_parts import Dart, Edge

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import arc_lengths
-from warpflat.flat.surface.cut.dart_legs import are_curved
+from warpflat.core import FloatArray, arc_lengths
+from warpflat.flat import are_curved
 from warpflat.pattern.drafting.curves import TOLERANCE, fit_curve
 from warpflat.pattern.drafting.dart_allowance import WIDEST_DART
 from warpflat.pattern.drafting.drafted import DraftedDart, DraftedEdge, drawn_leg

@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import polyline_length, resample
-from warpflat.core.text import name_without_number, without_side
+from warpflat.core import FloatArray, name_without_number, polyline_length, resample, without_side
 from warpflat.pattern.drafting.curves import Curve, fit_curve
 from warpflat.pattern.drafting.draft import nest_label
 from warpflat.pattern.drafting.drafted import DraftedEdge, DraftedPiece

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_banded
 
-from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.polyline import arc_lengths, points_at_lengths
+from warpflat.core import BoolArray, FloatArray, arc_lengths, points_at_lengths
 
 __all__ = ["FairLine", "bend_one_way", "count_inflections", "fair_line", "fairest_line"]
 

@@ -6,9 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import polyline_length
-from warpflat.core.text import without_side
+from warpflat.core import FloatArray, polyline_length, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.sewing_tasks import is_flounce
 from warpflat.pattern.drafting.words import translate, translate_name

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import arc_lengths, polyline_length, segment_lengths, turning_angles
+from warpflat.core import FloatArray, arc_lengths, polyline_length, segment_lengths, turning_angles
 from warpflat.pattern.drafting.curves import TOLERANCE, Curve, chords, farthest, fit_curve
 from warpflat.pattern.drafting.piece_parts import SAME_POINT
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide

@@ -9,12 +9,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.output import optional_step
-from warpflat.flat.surface.connectivity import border_loops
-from warpflat.flat.surface.overlap import parted
-from warpflat.flat.surface.repair.meet import MEET
+from warpflat.core import FloatArray, InputError, IntArray, nearest, optional_step
+from warpflat.flat import MEET, border_loops, parted
 from warpflat.pattern.drafting.corners import find_corners, find_cracks
 from warpflat.pattern.drafting.piece_parts import LEFT_OUT, Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import Piece, check_hole

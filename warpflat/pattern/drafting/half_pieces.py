@@ -7,10 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.output import optional_step
-from warpflat.core.polyline import arc_lengths
-from warpflat.core.text import without_side
+from warpflat.core import FloatArray, arc_lengths, optional_step, without_side
 from warpflat.pattern.drafting.curves import Curve, split_bezier
 from warpflat.pattern.drafting.draft import draft_half
 from warpflat.pattern.drafting.drafted import DraftedEdge, DraftedGarment, DraftedPiece

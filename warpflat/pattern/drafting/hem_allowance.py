@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core import FloatArray
 from warpflat.pattern.drafting.polygons import (
     cut_off,
     difference,

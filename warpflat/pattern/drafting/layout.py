@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core import FloatArray
 from warpflat.pattern.drafting.draft import nest_label
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 

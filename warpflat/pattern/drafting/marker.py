@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.text import size_words
+from warpflat.core import FloatArray, InputError, nearest, size_words
 from warpflat.pattern.drafting.cut_list import cloths_of
 from warpflat.pattern.drafting.drafted import DraftedEdge, DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.label import Label, printed_size

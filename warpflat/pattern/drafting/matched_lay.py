@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.errors import InputError, nearest
+from warpflat.core import BoolArray, FloatArray, InputError, nearest
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.tile_nesting import CELL, Mask, Places, orders
 

@@ -6,8 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import arc_lengths, points_at_lengths
+from warpflat.core import FloatArray, arc_lengths, points_at_lengths
 from warpflat.pattern.drafting.allowance import CutOutline
 from warpflat.pattern.drafting.drafted import DraftedPiece, Notch, SeamReport
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide

@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.input_files import FARTHEST
+from warpflat.core import FARTHEST, FloatArray, InputError
 from warpflat.pattern.drafting.corners import find_corners
 from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT, MOST_ALLOWANCE, Dart, Edge
 

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.polyline import polyline_length
+from warpflat.core import FloatArray, InputError, IntArray, nearest, polyline_length
 
 __all__ = [
     "DEFAULT_ALLOWANCE",

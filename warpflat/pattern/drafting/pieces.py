@@ -9,12 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.file_names import check_label
-from warpflat.core.short_repr import short_repr
-from warpflat.core.text import size_words, without_side
-from warpflat.flat.surface.overlap import OVERLAP, overlap_width, overlapping
+from warpflat.core import FloatArray, InputError, check_label, nearest, short_repr, size_words, without_side
+from warpflat.flat import OVERLAP, overlap_width, overlapping
 from warpflat.pattern.drafting.measures import UNITS
 from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT, SAME_POINT, Dart, Edge, FoundSeam, Hole, check_points
 from warpflat.pattern.drafting.seam_difference import eased_length

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import points_at_lengths, polyline_length
+from warpflat.core import FloatArray, points_at_lengths, polyline_length
 from warpflat.pattern.drafting.label import LEADING, TEXT, TITLE, Label, label_lines, rotation, text_width, wrap_text
 from warpflat.pattern.drafting.pieces import Piece
 from warpflat.pattern.drafting.words import translate

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core import FloatArray
 
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core import FloatArray
 
 __all__ = ["LOCAL_TOLERANCE", "SEAM_TOLERANCE", "STRETCH", "eased_length", "worst_difference"]
 

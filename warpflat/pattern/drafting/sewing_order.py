@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core.text import other_side, without_side
+from warpflat.core import other_side, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.pieces import Seam, SeamOpening, SeamSide
 from warpflat.pattern.drafting.seam_words import joint_words

@@ -9,9 +9,7 @@ from dataclasses import dataclass, field, replace
 from importlib import resources
 from typing import Any
 
-from warpflat.core.polyline import polyline_length
-from warpflat.core.text import other_side, without_side
-from warpflat.core.toml_file import read_toml
+from warpflat.core import other_side, polyline_length, read_toml, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide

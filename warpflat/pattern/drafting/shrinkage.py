@@ -6,9 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths
+from warpflat.core import FloatArray, InputError, arc_lengths
 from warpflat.pattern.drafting.curves import Curve
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 

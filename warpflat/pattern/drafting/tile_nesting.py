@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from shapely import Polygon

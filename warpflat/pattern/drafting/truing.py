@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import arc_lengths
+from warpflat.core import FloatArray, arc_lengths
 from warpflat.pattern.drafting.curves import Curve, cubic_weights, split_bezier
 from warpflat.pattern.drafting.fitting import EdgeKey
 from warpflat.pattern.drafting.piece_parts import Edge

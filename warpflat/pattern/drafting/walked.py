@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import points_at_lengths
+from warpflat.core import FloatArray, points_at_lengths
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece, SeamReport
 from warpflat.pattern.drafting.notches import SeamLine, copied_together, opposite_length
 

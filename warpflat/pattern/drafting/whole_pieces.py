@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
+from warpflat.core import FloatArray, InputError
 from warpflat.pattern.drafting.drafted_darts import fisheye_legs
 from warpflat.pattern.drafting.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from importlib import resources
 
-from warpflat.core.toml_file import read_toml
+from warpflat.core import read_toml
 
 __all__ = ["language_words", "listed", "printed_in", "translate", "translate_name"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core import FloatArray
 
 __all__ = ["ClothKind", "Measure", "NeededOpening", "ViewedPiece", "Worn"]
 

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.sums import weighted_percentile
+from warpflat.core import FloatArray, IntArray, weighted_percentile
 
 __all__ = ["SMALLEST_SCALE", "VertexColours", "energy_colours", "energy_scale", "linear_rgb", "on_cloth"]
 

@@ -15,12 +15,19 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from warpflat._version import __version__
-from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.output import atomic_path
-from warpflat.core.polyline import arc_lengths, points_at_lengths, turning_angles
-from warpflat.core.source_date import source_date
-from warpflat.core.text import control_in, plain_letters
+from warpflat.core import (
+    BoolArray,
+    FloatArray,
+    InputError,
+    arc_lengths,
+    atomic_path,
+    control_in,
+    nearest,
+    plain_letters,
+    points_at_lengths,
+    source_date,
+    turning_angles,
+)
 from warpflat.pattern.drafting.cut_list import cloths_of
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.label import text_width

@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.output import atomic_path
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import FloatArray, IntArray, atomic_path
+from warpflat.flat import triangulate
 from warpflat.pattern.export.raster import rasterise, shade
 
 __all__ = [

@@ -16,18 +16,14 @@ from matplotlib.colors import Normalize
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 
-from warpflat.core.activity import report_activity
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.sums import weighted_percentile
-from warpflat.flat.flattening.fit_report import RANGES, limit_words, pressure_words, remedy_words, strain_words
-from warpflat.flat.model.fit import MAPS, WornFit
-from warpflat.flat.surface.half_edges import border_edges
+from warpflat.core import FloatArray, IntArray, report_activity, weighted_percentile
+from warpflat.flat import MAPS, RANGES, WornFit, border_edges, limit_words, pressure_words, remedy_words, strain_words
 from warpflat.pattern.export.colours import on_cloth
 from warpflat.pattern.export.figure import ColouredFaces, new_figure, write_figure
 from warpflat.pattern.export.letters import all_letters, is_drawn, titles
 
 if TYPE_CHECKING:
-    from warpflat.flat.flattening.result import Flattening
+    from warpflat.flat import Flattening
 
 __all__ = ["OnBody", "write_wear_picture", "write_wear_sheet"]
 

@@ -12,9 +12,7 @@ import numpy as np
 from pydantic_core import to_json
 from scipy.spatial.transform import Rotation
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.output import atomic_path
-from warpflat.core.polyline import arc_lengths, points_at_lengths, turning_angles
+from warpflat.core import FloatArray, arc_lengths, atomic_path, points_at_lengths, turning_angles
 from warpflat.pattern.drafting.curves import cubic_weights
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.fitting import EdgeKey

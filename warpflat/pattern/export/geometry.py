@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.flat.surface.normals import area_vectors
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import FloatArray, IntArray
+from warpflat.flat import area_vectors, triangulate
 
 __all__ = [
     "Polylines",

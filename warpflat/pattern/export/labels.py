@@ -12,9 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.polyline import polyline_length, resample
-from warpflat.core.text import name_without_number
+from warpflat.core import BoolArray, FloatArray, name_without_number, polyline_length, resample
 from warpflat.pattern.drafting.placement import (
     LabelRoom,
     Spot,

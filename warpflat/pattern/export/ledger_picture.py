@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.flat.model.join import join_surfaces
+from warpflat.core import FloatArray
+from warpflat.flat import join_surfaces
 from warpflat.pattern.export.colours import energy_colours, energy_scale
 from warpflat.pattern.export.figure import PAGE_WIDTH, Pen, new_figure, write_figure
 from warpflat.pattern.export.geometry import polylines_of
@@ -17,7 +17,7 @@ from warpflat.pattern.export.letters import all_letters
 from warpflat.pattern.export.picture_views import DrawnView, make_facets, surface_view, view_from_side
 
 if TYPE_CHECKING:
-    from warpflat.flat.cutting.ledger import Ledger, LedgerEntry
+    from warpflat.flat import Ledger, LedgerEntry
 
 __all__ = ["candidate_words", "write_ledger_picture"]
 

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic_core import to_json
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.output import atomic_path
-from warpflat.flat.surface.mesh import Surface
+from warpflat.core import FloatArray, atomic_path
+from warpflat.flat import Surface
 
 __all__ = ["write_obj"]
 

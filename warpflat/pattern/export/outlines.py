@@ -10,10 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.text import format_count, quote_value
-from warpflat.flat.surface.connectivity import join_labels
+from warpflat.core import FloatArray, InputError, format_count, quote_value
+from warpflat.flat import join_labels
 from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT
 
 __all__ = [

@@ -17,13 +17,18 @@ from pydantic import AfterValidator, ConfigDict, Field, model_validator
 from pydantic_core import to_json
 
 from warpflat._version import __version__
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.file_names import check_label
-from warpflat.core.input_files import guarded, read_json
-from warpflat.core.output import atomic_path
-from warpflat.core.text import control_in, quote_value
-from warpflat.core.toml_file import Table, check_table
+from warpflat.core import (
+    FloatArray,
+    InputError,
+    Table,
+    atomic_path,
+    check_label,
+    check_table,
+    control_in,
+    guarded,
+    quote_value,
+    read_json,
+)
 from warpflat.pattern.drafting.curves import Curve
 from warpflat.pattern.drafting.cut_list import cut_list
 from warpflat.pattern.drafting.drafted import (

@@ -16,9 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.output import atomic_path, optional_file
+from warpflat.core import FloatArray, InputError, atomic_path, nearest, optional_file
 from warpflat.pattern.drafting.draft import nest_label, relabelled
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.drawing import Drawing, OnPaper, Stroke, draw_nest

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.text import energy_words, without_side
+from warpflat.core import FloatArray, energy_words, without_side
 from warpflat.pattern.drafting.cut_list import cloths_of, cut_list
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.finished import finished_lengths

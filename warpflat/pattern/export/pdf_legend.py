@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core import FloatArray
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.label import BOLD, CAPITALS, FONT, printed_size, text_width
 from warpflat.pattern.drafting.layout import Sheet

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core import FloatArray
 from warpflat.pattern.drafting.draft import nest_label
 from warpflat.pattern.drafting.layout import Sheet
 

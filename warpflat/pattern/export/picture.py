@@ -12,9 +12,8 @@ import numpy as np
 from matplotlib.patches import Polygon
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
-from warpflat.core.activity import report_activity
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.flat.surface.mesh import Surface
+from warpflat.core import FloatArray, IntArray, report_activity
+from warpflat.flat import Surface
 from warpflat.pattern.export.colours import SMALLEST_SCALE, energy_colours, energy_scale
 from warpflat.pattern.export.figure import DPI, GREY, MARGIN, PAGE_WIDTH, POINT, Pen, Pixels, new_figure, write_figure
 from warpflat.pattern.export.geometry import polylines_of

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.patches import Polygon
 
-from warpflat.core.arrays import FloatArray
-from warpflat.flat.surface.mesh import Surface
+from warpflat.core import FloatArray
+from warpflat.flat import Surface
 from warpflat.pattern.export.figure import GREY, INK, Pen
 from warpflat.pattern.export.picture_page import draw_scale_bar, pack_rows
 

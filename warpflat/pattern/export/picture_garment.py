@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.flat.surface.connectivity import join_labels
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import FloatArray, IntArray
+from warpflat.flat import Surface, join_labels, triangulate
 from warpflat.pattern.export.colours import energy_colours
 from warpflat.pattern.export.figure import GREY, Pen
 from warpflat.pattern.export.geometry import outline_edges

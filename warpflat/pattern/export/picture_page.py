@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from matplotlib.patches import Rectangle
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core import FloatArray, IntArray
 from warpflat.pattern.drafting.placement import LabelRoom, Spot
 from warpflat.pattern.export.colours import energy_colours
 from warpflat.pattern.export.figure import GRAIN, GREY, INK, LABEL_SIZE, MARGIN, PAGE_WIDTH, Pen

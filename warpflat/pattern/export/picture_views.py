@@ -12,10 +12,8 @@ from matplotlib.collections import PathCollection
 from matplotlib.path import Path
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.normals import area_vectors, mean_normals
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import BoolArray, FloatArray, IntArray
+from warpflat.flat import Surface, area_vectors, mean_normals, triangulate
 from warpflat.pattern.export.figure import DPI, HALO_LAYER, INK, Pixels
 from warpflat.pattern.export.geometry import outline_edges
 from warpflat.pattern.export.raster import Lighting, Samples, rasterise, shade

@@ -12,8 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.markers import CARETDOWNBASE, CARETUPBASE
 from matplotlib.patches import Polygon
 
-from warpflat.core.activity import report_activity
-from warpflat.core.arrays import FloatArray
+from warpflat.core import FloatArray, report_activity
 from warpflat.pattern.drafting.walked import WalkedSeam
 from warpflat.pattern.export.figure import new_figure, write_figure
 from warpflat.pattern.export.letters import all_letters

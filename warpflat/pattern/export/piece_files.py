@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpflat.core.output import file_in, optional_file, output_folder, require_own_metrics, write_report
-from warpflat.core.text import energy_words
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.model.strain import worn_strain
+from warpflat.core import energy_words, file_in, optional_file, output_folder, require_own_metrics, write_report
+from warpflat.flat import Flattening, worn_strain
 from warpflat.pattern.export.obj import write_obj
 
 if TYPE_CHECKING:

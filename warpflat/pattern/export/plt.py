@@ -11,8 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from warpflat.core.output import atomic_path
-from warpflat.core.text import plain_letters
+from warpflat.core import atomic_path, plain_letters
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.drawing import draw_nest
 from warpflat.pattern.drafting.layout import lay_out, nests

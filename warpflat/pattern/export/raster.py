@@ -15,8 +15,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.compile import launch_quietly, start_warp
+from warpflat.core import FloatArray, IntArray, launch_quietly, start_warp
 from warpflat.kernels.raster import put_nearest, shade_pixels
 
 __all__ = ["Lighting", "Samples", "rasterise", "shade"]

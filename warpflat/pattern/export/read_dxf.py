@@ -13,11 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.file_names import plain_label
-from warpflat.core.input_files import FARTHEST, Place, reading
-from warpflat.core.text import find_unused_name, quote_value
+from warpflat.core import FARTHEST, FloatArray, InputError, Place, find_unused_name, plain_label, quote_value, reading
 from warpflat.pattern.drafting.corners import find_corners
 from warpflat.pattern.drafting.outline_edges import (
     boundary_edges,

@@ -12,10 +12,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from scipy.spatial.transform import Rotation
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.polyline import polyline_length
-from warpflat.core.toml_file import check_table
+from warpflat.core import FloatArray, InputError, check_table, nearest, polyline_length
 from warpflat.pattern.drafting.curves import Curve, as_cubic
 from warpflat.pattern.drafting.piece_parts import Dart, Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide

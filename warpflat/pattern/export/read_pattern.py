@@ -7,9 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from warpflat.core.errors import InputError
-from warpflat.core.file_names import make_file_name
-from warpflat.core.input_files import guarded
+from warpflat.core import InputError, guarded, make_file_name
 from warpflat.pattern.drafting.draft import draft_garment, relabelled
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.pieces import Pattern

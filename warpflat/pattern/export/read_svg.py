@@ -14,10 +14,7 @@ from xml.parsers import expat
 import numpy as np
 from scipy.spatial import cKDTree
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.input_files import FARTHEST, reading
-from warpflat.core.text import find_unused_name, quote_value
+from warpflat.core import FARTHEST, FloatArray, InputError, find_unused_name, quote_value, reading
 from warpflat.pattern.drafting.curves import as_cubic, cubic_weights
 from warpflat.pattern.drafting.outline_edges import (
     boundary_edges,

@@ -11,9 +11,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.flat.surface.normals import vertex_normals
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import FloatArray, IntArray
+from warpflat.flat import triangulate, vertex_normals
 from warpflat.pattern.export.usd_prims import define_mesh, export_stage, set_points, valid_name
 
 __all__ = ["write_sewn_usd"]

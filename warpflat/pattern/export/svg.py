@@ -9,9 +9,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.output import atomic_path
-from warpflat.core.text import control_in, format_count, size_words
+from warpflat.core import FloatArray, atomic_path, control_in, format_count, size_words
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.drawing import Drawing, Stroke, draw_nest, grain_strokes
 from warpflat.pattern.drafting.label import CAPITALS, LEADING, Words, text_width

@@ -19,12 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat._version import __version__
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
-from warpflat.core.output import atomic_path, hidden_file, require_writable
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.normals import vertex_normals
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import FloatArray, InputError, IntArray, atomic_path, hidden_file, require_writable
+from warpflat.flat import Surface, triangulate, vertex_normals
 from warpflat.pattern.export.colours import VertexColours, energy_scale
 from warpflat.pattern.export.geometry import Polylines, face_areas, polylines_of
 from warpflat.pattern.export.usd_prims import (

@@ -18,10 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import CannotWriteError
-from warpflat.core.output import atomic_path
-from warpflat.flat.surface.mesh import Surface
+from warpflat.core import CannotWriteError, FloatArray, IntArray, atomic_path
+from warpflat.flat import Surface
 from warpflat.pattern.export.geometry import Polylines
 
 __all__ = [
