@@ -194,7 +194,7 @@ def test_metrics_of_another_program_are_not_replaced(
     def too_late(*_: object, **__: object) -> None:
         raise AssertionError("it was flattened first")
 
-    monkeypatch.setattr("warpflat.flat.flattening.flatten_piece.flatten", too_late)
+    monkeypatch.setattr("warpflat.flat.flatten", too_late)
     own = tmp_path / "out" / "metrics.json"
     own.parent.mkdir()
     own.write_text(text, errors="surrogateescape")

@@ -273,7 +273,7 @@ def test_what_a_run_reads_it_neither_replaces_nor_computes_with(
 
     Path("front.obj").write_text(SQUARE)
     commands = arranged()
-    monkeypatch.setattr("warpflat.flat.flattening.flatten_piece.flatten", fail)
+    monkeypatch.setattr("warpflat.flat.flatten", fail)
     monkeypatch.setattr("warpflat.garment.mannequin.mannequin.Mannequin.from_scan", fail)
     for arguments in commands:
         assert "is read by this run" in command(*arguments).refusal

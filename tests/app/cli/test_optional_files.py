@@ -74,6 +74,10 @@ def fail(monkeypatch: pytest.MonkeyPatch, places: Iterable[str], error: Callable
         def broken(*_: object, place: str = place, **__: object) -> None:
             raise error(place)
 
+        # What the layers above take by the door.
+        door = importlib.import_module(".".join(parts[:2]))
+        if parts[-1] in door.__all__:
+            monkeypatch.setattr(door, parts[-1], broken)
         monkeypatch.setattr(owner, parts[-1], broken)
 
 

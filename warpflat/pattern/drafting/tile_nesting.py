@@ -79,7 +79,7 @@ class _Grid:
             rows, columns = (
                 _blocks(mask.cells.shape[axis], self.per_tile[axis], self.shared[axis]) for axis in range(2)
             )
-            self._touched[id(mask)] = _covered(mask.cells, rows, columns).astype(np.float64)
+            self._touched[id(mask)] = _covered(mask.cells, rows, columns).astype(np.float32)
         return self._touched[id(mask)]
 
 
@@ -255,7 +255,7 @@ def _lay(
             down, across = free.shape
             touched, cells = grid.touched(mask), mask.cells
             over = touched.shape[1], touched.shape[3]
-            new = np.zeros(np.add(used.shape, over))
+            new = np.zeros(np.add(used.shape, over), dtype=np.float32)
             new[: used.shape[0], : used.shape[1]] = ~used
             windows = np.lib.stride_tricks.sliding_window_view(new, over)  # by the tile where a mask starts
             cost = np.tensordot(windows, touched, axes=([2, 3], [1, 3])).transpose(0, 2, 1, 3)
