@@ -26,6 +26,8 @@ SKIN, CLOTH, LIGHT = (0.86, 0.78, 0.71), (0.36, 0.52, 0.68), (-0.35, 0.45, 0.82)
 NEARER = 0.01
 # A pixel [m], and samples of it along either side.
 PIXEL, SAMPLES = 0.0018, 3
+# What is shown around the cloth [m].
+BELOW, ABOVE = (-0.06, -0.05, -0.3), (0.06, 0.22, 0.3)
 
 #: A mesh: vertices, triangles and colour.
 Part = tuple[np.ndarray, np.ndarray, tuple[float, float, float]]
@@ -74,7 +76,7 @@ def main(file: str, folder: Path) -> None:
     """Write the figure to `file`, of a shirt that lies in a folder."""
     figure = new_figure(11.0, 3.5, dpi=110)
     shown = list(meshes(folder / "worn" / "frames.usdc"))
-    low, high = shown[1][0].min(axis=0) - [0.06, 0.05, 0.3], shown[1][0].max(axis=0) + [0.06, 0.22, 0.3]
+    low, high = shown[1][0].min(axis=0) + BELOW, shown[1][0].max(axis=0) + ABOVE
     for number, sign in enumerate((1.0, -1.0)):
         axes = figure.add_axes((0.35 * number, 0.01, 0.34, 0.98))
         axes.imshow(seen(shown, low, high, sign))
