@@ -28,7 +28,8 @@ def api_page() -> str:
     Raises:
         ValueError: a public name lies in a room that no group lists.
     """
-    homes = {name: home for name, home in warpflat._HOME.items() if not name.startswith("_")}
+    names = [name for name in warpflat.__all__ if not name.startswith("_")]
+    homes = {name: getattr(warpflat, name).__module__.removeprefix("warpflat.") for name in names}
     known = tuple(f"{room}." for rooms in GROUPS.values() for room in rooms)
     if lost := sorted(name for name, home in homes.items() if not home.startswith(known)):
         raise ValueError(f"no group for {', '.join(lost)}")
