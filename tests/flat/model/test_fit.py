@@ -53,7 +53,7 @@ def test_a_stretched_cylinder_has_the_closed_form_pattern_and_laplace_s_pressure
     np.testing.assert_allclose(fit.strain_weft, 0.2, atol=1e-6)
     np.testing.assert_allclose(fit.tension_weft, tension, rtol=1e-5)
     np.testing.assert_allclose(fit.pressure, tension / RADIUS, rtol=0.01)
-    assert fit.fits
+    assert fit.within_limits
     assert result.measures["model_energy_j"] < 1e-9
     assert result.measures["strain_energy_j"] == pytest.approx(
         0.5 * NET.stiffness_weft * 0.2**2 * width * height, rel=1e-5
@@ -109,9 +109,9 @@ def test_a_given_pattern_is_judged():
     surface = sleeve(resolution=17)
     flat = warpflat.flatten(surface, fabric="denim", datum="centre", device=DEVICE).positions
     denim = find_fabric("denim")
-    assert assess_pattern(surface, denim, flat).fits
+    assert assess_pattern(surface, denim, flat).within_limits
     tight = assess_pattern(surface, denim, flat * [0.92, 1.0])
-    assert not tight.fits
+    assert not tight.within_limits
     assert tight.outside == pytest.approx(1.0)
     assert tight.misfits[0].worst.value == pytest.approx(1 / 0.92 - 1, rel=1e-6)
     assert "stretched 8.7 % along weft (limit 5 %)" in tight.misfits[0].words
@@ -140,7 +140,7 @@ SQUARE = [[0, 0], [0.1, 0], [0.1, 0.1], [0, 0.1]]
 def test_cloth_fits_up_to_its_limit_of_shear_and_not_beyond(fabric: str, triangles: bool, sign: float):
     cloth = find_fabric(fabric)
     within = assess_pattern(sheared(sign * 0.9 * cloth.shear_limit, triangles=triangles), cloth, SQUARE)
-    assert within.fits
+    assert within.within_limits
     assert within.outside == 0.0
     np.testing.assert_allclose(within.shear, sign * 0.9 * cloth.shear_limit, rtol=1e-9)
     np.testing.assert_allclose(within.strain_warp, 0.0, atol=1e-9)
@@ -153,7 +153,7 @@ def test_cloth_fits_up_to_its_limit_of_shear_and_not_beyond(fabric: str, triangl
         sheared(1.1 * cloth.shear_limit, triangles=triangles),
         replace(cloth, shear_limit=1.2 * cloth.shear_limit),
         SQUARE,
-    ).fits
+    ).within_limits
 
 
 def test_a_place_beyond_both_limits_counts_once():
@@ -363,5 +363,5 @@ def test_a_pressure_on_a_ball_is_carried_both_ways():
 def test_a_stretch_beyond_the_limit_is_meant_and_told():
     wear = Wear(stretch_weft=NET.strain_limit + 0.1)
     result = warpflat.flatten(sleeve(), fabric=NET, datum="centre", wear=wear, device=DEVICE)
-    assert result.fit.fits
+    assert result.fit.within_limits
     assert any("beyond power-net's limit" in note for note in result.notes)

@@ -63,7 +63,7 @@ def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Re
         trial: make each cut, relax, and keep those that help, best first; else all of them, nearest first.
     """
     unsewn = result.unsewn or result
-    if fit.fits or unsewn.fit.fits:
+    if fit.within_limits or unsewn.fit.within_limits:
         return []
     found: list[Remedy] = []
     # One by one, since a path over a large mesh takes a while.

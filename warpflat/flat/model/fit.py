@@ -31,7 +31,7 @@ from warpflat.flat.surface.mesh import Surface
 __all__ = ["MAPS", "TOUCHING", "Misfit", "WornFit", "assess_fit", "assess_pattern"]
 
 
-# A pattern fits if less than this share of its cloth is strained or sheared beyond a limit: a corner's last face may be.
+# So much of the cloth may be strained or sheared beyond a limit: a corner's last face may be.
 TOLERATED = 0.01
 
 # Curvature that shears cloth is gathered over so far [m].
@@ -166,8 +166,8 @@ class WornFit:
         return float(self.area[chosen].sum() / max(float(self.area.sum()), 1e-300))
 
     @property
-    def fits(self) -> bool:
-        """True if at most 1 % of the cloth is stretched or sheared beyond the fabric's limits."""
+    def within_limits(self) -> bool:
+        """True if at most 1 % of the piece is stretched or sheared beyond the fabric's limits; whether a garment fits says its verdict."""
         return self.held <= TOLERATED
 
     def as_dict(self) -> dict[str, Any]:

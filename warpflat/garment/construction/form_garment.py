@@ -242,7 +242,7 @@ def flatten_form(
     if (
         kept.sewn is not None
         and kept.sewn.converged
-        and not (knit and any(not each.fit.fits for each in kept.pieces.values()))
+        and not (knit and any(not each.fit.within_limits for each in kept.pieces.values()))
     ):
         return kept
     free = sewn_under(held)
@@ -303,4 +303,4 @@ def _with_curves(
 
 def _strained(before: Garment, after: Garment) -> list[str]:
     """Return the pieces that fit before and do not after."""
-    return [name for name, piece in after.pieces.items() if not piece.fit.fits and before.pieces[name].fit.fits]
+    return [name for name, piece in after.pieces.items() if not piece.fit.within_limits and before.pieces[name].fit.within_limits]

@@ -195,7 +195,7 @@ def write_wear_sheet(
             lines += [pressure, f"= {p05:.1f} to {p95:.1f} mmHg [up to {most:.1f}]"]
         if result.grain_angle:
             lines.append(f"warp turned by {result.grain_angle:g} degrees")
-        if not fit.fits:
+        if not fit.within_limits:
             lines.append("")
             lines += [f"worst: {misfit.words.split(';')[0]}" for misfit in fit.misfits[:1]]
             lines += [remedy_words(remedy.as_dict(), sewn=result.unsewn is not None) for remedy in result.remedies[:1]]
@@ -203,7 +203,7 @@ def write_wear_sheet(
         figure.text(x, y, shown_names[result.surface.name], fontsize=11, weight="bold", va="top")
         y -= 0.22 / float(figure.get_size_inches()[1])
         text = "\n".join(fill(line, _LETTERS, subsequent_indent="  ") for line in lines)
-        figure.text(x, y, text, fontsize=9, va="top", linespacing=1.35, color="black" if fit.fits else "#b00000")
+        figure.text(x, y, text, fontsize=9, va="top", linespacing=1.35, color="black" if fit.within_limits else "#b00000")
         # Draw all maps of a piece side by side.
         drawn = {}
         middle = 0.5 * (result.positions.min(axis=0) + result.positions.max(axis=0))
@@ -264,7 +264,7 @@ class _Sheet:
         width, height = (max(float(spans[:, axis].max()), 1e-9) for axis in (0, 1))
         inches = min(_COLUMN / width, _TALLEST / height)
         rows = [
-            max(float(span) * inches, 1.35 if result.fit.fits else 2.5) + 0.18
+            max(float(span) * inches, 1.35 if result.fit.within_limits else 2.5) + 0.18
             for span, result in zip(spans[:, 1], results, strict=True)
         ]
         column = min(_COLUMN, max(float(spans[:, 0].max()) * inches, 1.5)) + 0.12
