@@ -50,10 +50,10 @@ def test_the_v_cycle_is_symmetric_and_near_to_the_factor(triangles: bool):
     one, other = one - one.mean(axis=0), other - other.mean(axis=0)
     np.testing.assert_allclose((one * cycle(other)).sum(), (other * cycle(one)).sum(), rtol=1e-4)
     # What is left of the error after a cycle, in the energy's norm.
-    right = laplacian.stiffness_matrix(surface) @ (exact := factor(one))
+    right = laplacian.cotangent_matrix(surface) @ (exact := factor(one))
     missed = exact - cycle(right)
     missed -= missed.mean(axis=0)
-    matrix = laplacian.stiffness_matrix(surface)
+    matrix = laplacian.cotangent_matrix(surface)
     assert (missed * (matrix @ missed)).sum() < 0.2**2 * (exact * (matrix @ exact)).sum()
 
 

@@ -393,7 +393,7 @@ def test_what_an_elastic_gathers_is_told_and_no_strain(bodice: warpflat.Garment,
 
 def test_a_scene_threads_the_elastics_of_its_finishings(monkeypatch: pytest.MonkeyPatch):
     seen: list[Sequence[str]] = []
-    monkeypatch.setattr(drape_garment, "drape", lambda *_, elastics, **__: seen.append(elastics))
+    monkeypatch.setattr("warpflat.garment.drape", lambda *_, elastics, **__: seen.append(elastics))
     scenes = Path(__file__).parents[3] / "scenes"
     for name in ("pyjama_trousers", "trousers"):
         drape_scene(load_scene(scenes / f"{name}.toml"), None)  # type: ignore[arg-type]
