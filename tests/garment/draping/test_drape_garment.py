@@ -21,7 +21,6 @@ from warpflat.app.scene.load import load_scene
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.flat.surface.connectivity import border_loops
-from warpflat.garment.draping import drape_garment
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.drape_garment import thread_elastics
 from warpflat.garment.draping.frames import choose_frames, write_drape_frames

@@ -303,4 +303,8 @@ def _with_curves(
 
 def _strained(before: Garment, after: Garment) -> list[str]:
     """Return the pieces that fit before and do not after."""
-    return [name for name, piece in after.pieces.items() if not piece.fit.within_limits and before.pieces[name].fit.within_limits]
+    return [
+        name
+        for name, piece in after.pieces.items()
+        if not piece.fit.within_limits and before.pieces[name].fit.within_limits
+    ]

@@ -203,7 +203,9 @@ def write_wear_sheet(
         figure.text(x, y, shown_names[result.surface.name], fontsize=11, weight="bold", va="top")
         y -= 0.22 / float(figure.get_size_inches()[1])
         text = "\n".join(fill(line, _LETTERS, subsequent_indent="  ") for line in lines)
-        figure.text(x, y, text, fontsize=9, va="top", linespacing=1.35, color="black" if fit.within_limits else "#b00000")
+        figure.text(
+            x, y, text, fontsize=9, va="top", linespacing=1.35, color="black" if fit.within_limits else "#b00000"
+        )
         # Draw all maps of a piece side by side.
         drawn = {}
         middle = 0.5 * (result.positions.min(axis=0) + result.positions.max(axis=0))
