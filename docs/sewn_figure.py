@@ -27,7 +27,7 @@ NEARER = 0.01
 # A pixel [m], and samples of it along either side.
 PIXEL, SAMPLES = 0.0018, 3
 # What is shown around the cloth [m].
-BELOW, ABOVE = (-0.06, -0.05, -0.3), (0.06, 0.06, 0.3)
+BELOW, ABOVE = (-0.06, -0.05, -0.3), (0.06, 0.01, 0.3)
 
 #: A mesh: vertices, triangles and colour.
 Part = tuple[np.ndarray, np.ndarray, tuple[float, float, float]]
@@ -68,7 +68,7 @@ def seen(shown: Sequence[Part], low: np.ndarray, high: np.ndarray, sign: float) 
         colours.append(np.tile(colour, (len(triangles), 1)))
     corners, faces, colour = np.concatenate(places), np.concatenate(rows), np.concatenate(colours)
     samples = rasterise(corners, faces, (int(size[1]), int(size[0])))
-    light = Lighting(normals=np.concatenate(normals), direction=LIGHT, back=SKIN)
+    light = Lighting(normals=np.concatenate(normals), direction=LIGHT, back=CLOTH)
     return shade(samples, SAMPLES, corners, faces, colour, face=np.arange(len(faces)), lighting=light)
 
 
