@@ -104,14 +104,18 @@ def close_lines(lines: Sequence[DrawnLine], fold: FloatArray | None = None) -> O
     of_net: dict[int, list[DrawnLine]] = {}
     for line, number in zip(open_lines, node[::2], strict=True):
         of_net.setdefault(int(net[number]), []).append(line)
+    named: dict[int, tuple[str, bool]] = {}
+    for number, own in of_net.items():
+        groups = {line.group for line in own}
+        group = groups.pop() if len(groups) == 1 else ""
+        one = next((line for line in own if line.name), own[0])
+        named[number] = group or one.name, bool(group) or one.by_hand
 
     def drawn(string: Any, *, closed: bool) -> DrawnLine:
         points = np.asarray(string.coords)[:-1] if closed and string.is_closed else np.asarray(string.coords)
-        own = next(of_net[int(at_place[key])] for point in points.tolist() if (key := tuple(point)) in at_place)
-        groups = {line.group for line in own}
-        named = next((line for line in own if line.name), own[0])
-        group = groups.pop() if len(groups) == 1 else ""
-        return DrawnLine(points=points, closed=closed, name=group or named.name, by_hand=bool(group) or named.by_hand)
+        number = next(int(at_place[key]) for point in points.tolist() if (key := tuple(point)) in at_place)
+        name, by_hand = named[number]
+        return DrawnLine(points=points, closed=closed, name=name, by_hand=by_hand)
 
     rings += [drawn(ring, closed=True) for ring in merged[closed]]
     rings += [drawn(area.exterior, closed=True) for area in shapely.get_parts(areas)]
