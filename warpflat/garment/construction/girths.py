@@ -61,7 +61,7 @@ def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping
 def pattern_girths(
     mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]
 ) -> dict[str, dict[str, float]]:
-    """Return the entry `girths` of `metrics.json` for every closed level of trunk, arms and legs, neck and armholes, that the pieces go around.
+    """Return the entry `girths` of `metrics.json`: levels of trunk, arms and legs, neck and armholes that the pieces go around.
 
     The pattern's girth is the length of the level's line in the pieces: a dart on the way adds nothing, nor does a seam. Where
     two pieces meet along the level it is the mean of both. A half piece counts twice. Where the line slopes on the form, as at
