@@ -129,6 +129,8 @@ def _caps(layout: Layout, form: FormResult) -> set[str]:
 def _lines(layout: Layout, form: FormResult) -> dict[str, tuple[IntArray, RowEdges]]:
     """Return the lines around neck and armholes that pieces of the trunk go around: the grid's vertices, and the edges along them."""
     caps = _caps(layout, form)
+    if len(caps) == len(form.pieces):
+        return {}
     trunk = PieceEdges(layout, replace(form, pieces={n: piece for n, piece in form.pieces.items() if n not in caps}))
     lines = {"neck": layout.lines["neck"][:-1], **{f"armhole {side}": arm[0] for side, arm in layout.arms.items()}}
     found = {name: (row, trunk.along(row, ALONG)) for name, row in lines.items()}
