@@ -144,7 +144,9 @@ def test_seams_come_out_with_their_ease_and_the_shorter_side_keeps_its_length(
     assert first == pytest.approx(on_body, rel=0.03)
     for seams in (measured, plain):
         halves = [seams[f"{half} armhole left"] for half in ("front", "back")]
-        assert sum(each.lengths[0] for each in halves) == pytest.approx(sum(each.length_3d for each in halves), abs=1e-3)
+        assert sum(each.lengths[0] for each in halves) == pytest.approx(
+            sum(each.length_3d for each in halves), abs=1e-3
+        )
     front, back = measured["shoulder right"].lengths
     assert front / back == pytest.approx(1.03, abs=1e-3)
     assert back == pytest.approx(plain["shoulder right"].lengths[1], rel=0.01)

@@ -571,7 +571,9 @@ def test_a_patch_lies_on_its_piece():
 
 
 def test_a_turned_down_collar_lies_on_the_garment():
-    collar = Finishing(kind="collar", edge="neck", width=0.07, placket=0.14, collar=Collar(style="convertible", width=0.07))
+    collar = Finishing(
+        kind="collar", edge="neck", width=0.07, placket=0.14, collar=Collar(style="convertible", width=0.07)
+    )
     garment, worn = placed_on("shirt", finishing=[collar])
     surfaces = [piece.surface for piece in garment.pieces.values()]
     first = np.cumsum([0, *(len(surface.vertices) for surface in surfaces)])

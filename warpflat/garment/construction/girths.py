@@ -27,9 +27,10 @@ __all__ = ["girth_constraints", "pattern_girths"]
 
 
 def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]) -> list[KeptGirth]:
-    """Return constraints that give every level of trunk, arms and legs the ease that a form asks for, and armholes with sleeves their length.
+    """Return constraints that give every level the ease that a form asks for, and armholes with sleeves their length.
 
-    Cloth at rest loses some of the ease to strain, or has more elsewhere. An armhole gives way to the longer cap that is eased into it.
+    Cloth at rest loses some of the ease to strain, or has more elsewhere. An armhole gives way to the longer cap that is
+    eased into it.
 
     Args:
         mannequin: the body.
@@ -127,7 +128,7 @@ def _caps(layout: Layout, form: FormResult) -> set[str]:
 
 
 def _lines(layout: Layout, form: FormResult) -> dict[str, tuple[IntArray, RowEdges]]:
-    """Return the lines around neck and armholes that pieces of the trunk go around: the grid's vertices, and the edges along them."""
+    """Return the lines around neck and armholes, where pieces of the trunk go around: the grid's vertices, the edges."""
     caps = _caps(layout, form)
     if len(caps) == len(form.pieces):
         return {}
