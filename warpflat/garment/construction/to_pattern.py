@@ -188,11 +188,11 @@ def pattern_of_garment(
     plans = {size: plan_form(each, rules) for size, each in forms.items()}
     plan = next(iter(plans.values()))
     # Relaxation keeps a piece upright, but not in its place: the lower ends of its datum lie on each other in all sizes.
-    laid = {}
+    laid, evened_sample = {}, evened(sample)
     for size, garment in garments.items():
         moved, even = {}, evened(garment)
         for piece, flat in even.pieces.items():
-            there = sample.pieces[piece]
+            there = evened_sample.pieces[piece]
             offset = there.positions[there.datum[0]] - flat.positions[flat.datum[0]]
             moved[piece] = replace(flat, positions=np.round(flat.positions + offset, _DECIMALS))
         laid[size] = replace(even, pieces=moved)
