@@ -21,7 +21,7 @@ from warpflat.core import other_side, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.pieces import Seam, SeamOpening, SeamSide
 from warpflat.pattern.drafting.seam_words import joint_words
-from warpflat.pattern.drafting.sewing_tasks import BANDS, GATHERED, Place, SewingTasks, Task, pieces_of, techniques
+from warpflat.pattern.drafting.sewing_tasks import GATHERED, Place, SewingTasks, Task, pieces_of, techniques
 from warpflat.pattern.drafting.words import translate, translate_name
 
 __all__ = [
@@ -36,9 +36,6 @@ __all__ = [
 
 #: A corner of a piece of cloth: its name, whether it is turned over, its copy, and the number of the edge that begins there.
 Corner = tuple[str, bool, int, int]
-
-#: Techniques whose seams and edges each have a step of their own.
-_ALONE = ("invisible_zip", "lapped_zip", "fly", "vent", "slit", "buttoned", "casing", "elastic_band", "buttonholes")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,11 +170,9 @@ def notions(garment: DraftedGarment, size: str) -> tuple[str, ...]:
 
 def tools(garment: DraftedGarment, size: str) -> str:
     """Return what the garment is made with, in words."""
-    used = {step.technique for step in sewing_steps(garment, size)}
+    used = {techniques()[step.technique].get("tool") for step in sewing_steps(garment, size)}
     needed = ["paper scissors and glue or tape", "cloth scissors", "tape measure", "chalk", "pins", "iron"]
-    needed += ["sewing machine", "hand needle"]
-    needed += ["zip foot"] if used & {"invisible_zip", "lapped_zip", "fly"} else []
-    needed += ["buttonhole foot"] if used & {"buttonholes", "end_button"} else []
+    needed += ["sewing machine", "hand needle", *(tool for tool in ("zip foot", "buttonhole foot") if tool in used)]
     if garment.garment.worn is not None and garment.garment.worn.knits:
         needed.append("needle and stitch for knits")
     return ", ".join(translate(word) for word in needed)
@@ -255,14 +250,14 @@ class _Workshop(SewingTasks):
                 longest = max((each.length for each in seam.openings if each.kind == "zip"), default=0.0)
                 if longest > 1e-3 * self.lengths.get(seam.name, (1e6, 0.0))[0] + 1e-3:
                     at_zip = [corner for pair in self._ends(seam) for corner in pair]
-                    bands = {each for corner in at_zip for each, _ in beside[corner] if each.technique in BANDS}
+                    bands = {each for corner in at_zip for each, _ in beside[corner] if each.how.get("lengthens")}
                     task.needs |= bands
                     for band in bands:
                         band.needs.discard(task)
                     task.pieces = pieces_of(place for band in bands for place in band.uses)
         # What is hemmed, bound or faced along edges is sewn when the seams are that end between these.
         for task in self.tasks:
-            if task.turn < 40 or task.seams:
+            if task.how["turn"] < 40 or task.seams:
                 continue
             reached = {(p, (self.order[p].index(e) + k) % len(self.order[p])) for p, e in task.uses for k in (0, 1)}
             for joint, crossing in ends.items():
@@ -303,7 +298,7 @@ class _Workshop(SewingTasks):
         def shape(task: Task) -> tuple[int, bool, bool, bool, bool]:
             """Return the turn of a task; of a seam whether it is eased, closes a ring, joins left and right, and front and back."""
             if task.technique not in ("", "lining_join"):
-                return task.turn, False, False, False, False
+                return task.how["turn"], False, False, False, False
             seam = task.seams[0]
             first, second = ((row[0].piece, row[0].mirrored, row[0].copy) for row in seam.sides)
             closes = cloth.get(first, first) == cloth.get(second, second)
@@ -313,7 +308,7 @@ class _Workshop(SewingTasks):
                 for part in (first, second)
             ]
             differ = faces[0] != faces[1] and all(map(any, faces))
-            return task.turn, 5e-4 < abs(seam.ease) < GATHERED, closes, centre, differ
+            return task.how["turn"], 5e-4 < abs(seam.ease) < GATHERED, closes, centre, differ
 
         def meet(one: Corner, other: Corner) -> bool:
             return one == other or frozenset((one, other)) in whole
@@ -355,7 +350,7 @@ class _Workshop(SewingTasks):
         while ready:
             first = min(ready, key=key)
             how, alike, batch = technique(first), shape(first), [first]
-            line = set[Task]()
+            line, alone = set[Task](), techniques()[how].get("alone", False)
             while True:
                 task = batch[-1]
                 line.update(() if task.technique else line_of(task)[0])
@@ -366,13 +361,11 @@ class _Workshop(SewingTasks):
                     names = {cloth.get(part, part) for part in parts}
                     cloth |= dict.fromkeys(parts, parts[0])
                     cloth = {part: parts[0] if name in names else name for part, name in cloth.items()}
-                more = [
-                    t for t in ready if t in line or (how not in _ALONE and technique(t) == how and shape(t) == alike)
-                ]
+                more = [t for t in ready if t in line or (not alone and technique(t) == how and shape(t) == alike)]
                 if not more:
                     break
                 batch.append(min(more, key=key))
-            if found and found[-1][0] == how and how not in _ALONE:
+            if found and found[-1][0] == how and not alone:
                 found[-1][1].extend(batch)
             else:
                 found.append((how, batch))
