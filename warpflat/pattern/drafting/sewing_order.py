@@ -8,7 +8,7 @@ closes a ring, panels of one side of the body before its halves, and these befor
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
@@ -394,28 +394,41 @@ class _Workshop(SewingTasks):
             _letter(len(set(self.letters.values()))) if task.like is None else self.letters[task.like.seams[0].name]
         )
         self.letters |= {each.name: letter for each in group}
-        # Seams called by their pieces have numbers from the second on; those of facings are said by their pieces, too.
+        # Seams called by their pieces have numbers from the second on; those of facings, and of equal pieces between others, are said
+        # by theirs, too.
         by_pieces = re.sub(r" \d+$", "", seam.name) == joint_words(seam) or task.technique == "facing_join"
-        name = translate_name(without_side(seam.name) if sideless else seam.name) if not by_pieces else ""
-        first, second = (_words(row, self.titles) for row in seam.sides)
-        if by_pieces:
-            name = translate(
-                "{first} to {second}" if first != second else "seam of the {first}", first=first, second=second
+        copied = any(part.copy for each in group for row in each.sides for part in row)
+        equal = copied and len({part.piece for each in group for row in each.sides for part in row}) > 2
+        by_pieces = by_pieces or equal
+        first, second = (self._words([each.sides[k] for each in (group if equal else group[:1])]) for k in (0, 1))
+        if not by_pieces:
+            name = translate_name(without_side(seam.name) if sideless else seam.name)
+        else:
+            words = "{first} to {second}" if first != second else "seam of the {first}"
+            name = translate(words, first=first, second=second)
+        return [
+            SewnSeam(
+                letter=letter,
+                name=name,
+                sides=(first, second),
+                length_mm=self.lengths.get(seam.name, (0.0, 0.0)),
+                ease=seam.ease,
+                held=held,
+                by_pieces=by_pieces,
+                lined=task.technique == "lining_join",
+                count=max(len(group), 2 if sideless else 1),
+                openings=seam.openings,
+                places=tuple(places),
             )
-        made = SewnSeam(
-            letter=letter,
-            name=name,
-            sides=(first, second),
-            length_mm=self.lengths.get(seam.name, (0.0, 0.0)),
-            ease=seam.ease,
-            held=held,
-            by_pieces=by_pieces,
-            lined=task.technique == "lining_join",
-            count=max(len(group), 2 if sideless else 1),
-            openings=seam.openings,
-            places=tuple(places),
-        )
-        return [made]
+        ]
+
+    def _words(self, rows: Iterable[Sequence[SeamSide]]) -> str:
+        """Return the pieces of each row once: those in a row are sewn to each other before."""
+        found: dict[frozenset[str], str] = {}
+        for row in rows:
+            titles = dict.fromkeys(self.titles[part.piece] for part in row)
+            found.setdefault(frozenset(titles), " + ".join(titles))
+        return ", ".join(found.values())
 
 
 def _letter(number: int) -> str:
@@ -426,7 +439,3 @@ def _letter(number: int) -> str:
         number, digit = divmod(number - 1, 26)
         letters = ascii_uppercase[digit] + letters
     return letters
-
-
-def _words(side: Sequence[SeamSide], titles: Mapping[str, str]) -> str:
-    return " + ".join(dict.fromkeys(titles[part.piece] for part in side))
