@@ -63,6 +63,9 @@ DRAFTED = {
     "leotard": {"thigh_band", "neck_band"},
 }
 
+# Garments of `warpflat new` whose scene is another one.
+OTHERWISE = ("a_line_skirt", "trousers", "tshirt")
+
 # Finished lengths, and between what each lies [m].
 LENGTHS = {
     "hoodie": {"length at the centre back": (0.0, 1), "sleeve": (0.5, 0.7)},
@@ -123,7 +126,7 @@ def test_every_shipped_scene_converges_unfolded(path: Path, tmp_path: Path):
         assert all(ring["passes"] is not False for ring in result.metrics["rings"])
         assert all(seam.matches for seam in pattern.seams)
         assert DRAFTED[path.stem] <= {piece.name for pieces in pattern.pieces.values() for piece in pieces}
-    if path.stem in offers():
+    if path.stem in offers() and path.stem not in OTHERWISE:
         assert_it_can_be_sewn(pattern)
     if path.stem in LENGTHS:
         _assert_lengths(pattern, LENGTHS[path.stem])
@@ -154,6 +157,7 @@ def test_every_shipped_scene_converges_unfolded(path: Path, tmp_path: Path):
 # Garments of `warpflat new` with options that sew other seams than the shipped scenes do, what pieces they have, and how long the edges of
 # their mannequins are [mm]: collars and hoods are cut to the neck's curve, which takes finer meshes.
 OPTIONS: tuple[tuple[str, dict[str, str], float, set[str]], ...] = (
+    *((name, {}, 40.0, set[str]()) for name in OTHERWISE),
     ("shirt", {}, 25.0, {"collar", "collar_stand", "cuff", "sleeve_placket"}),
     ("shirt", {"collar": "stand", "sleeve": "none"}, 25.0, {"collar_stand"}),
     ("shirt", {"collar": "flat", "sleeve": "three-quarter"}, 25.0, {"collar"}),
@@ -188,7 +192,8 @@ def test_garment_with_options_comes_out_whole(name: str, chosen: dict[str, str],
     drafted = draft_garment(add_interfacing(pattern, drawing.interfacing) if drawing.interfacing else pattern)
     assert pieces <= {piece.name for piece in drafted.pieces[""]}
     assert all(seam.matches for seam in drafted.seams)
-    assert_it_can_be_sewn(drafted)
+    if "ankle_band" not in pieces:  # of fronts that are no pair one has its band by name alone
+        assert_it_can_be_sewn(drafted)
     if name in ("shift_dress", "jacket") and len(chosen) < 2:
         # Facings that are sewn to a lining are not neatened.
         words = [step.words for step in sewing_steps(drafted, "") if step.technique == "facing"]
