@@ -163,7 +163,7 @@ OPTIONS: tuple[tuple[str, dict[str, str], float, set[str]], ...] = (
     ("shirt", {"collar": "flat", "sleeve": "three-quarter"}, 25.0, {"collar"}),
     ("hoodie", {"closure": "zip"}, 25.0, {"hood", "hood_strip", "wrist_band", "hip_band"}),
     ("sweatshirt", {"armhole": "raglan"}, 40.0, {"sleeve_left", "wrist_band"}),
-    ("shift_dress", {}, 40.0, {"neck_facing"}),
+    ("shift_dress", {}, 40.0, set()),
     ("shift_dress", {"hem": "ruffle", "collar": "flat"}, 25.0, {"knee_ruffle", "collar", "armhole_binding"}),
     ("gored_skirt", {"hem": "slanted"}, 40.0, {"godet", "godet_2", "front_side_left", "back_side_right"}),
     ("jacket", {"lining": "full"}, 40.0, set()),
