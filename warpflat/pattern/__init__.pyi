@@ -53,6 +53,9 @@ from .drafting.worn import Measure as Measure
 from .drafting.worn import NeededOpening as NeededOpening
 from .drafting.worn import ViewedPiece as ViewedPiece
 from .drafting.worn import Worn as Worn
+from .export.colours import DRAFTED_CLOTH as DRAFTED_CLOTH
+from .export.colours import ENERGY as ENERGY
+from .export.colours import SKIN as SKIN
 from .export.colours import SMALLEST_SCALE as SMALLEST_SCALE
 from .export.colours import Scale as Scale
 from .export.colours import VertexColours as VertexColours
@@ -60,7 +63,6 @@ from .export.colours import energy_colours as energy_colours
 from .export.colours import energy_scale as energy_scale
 from .export.colours import linear_rgb as linear_rgb
 from .export.dressed import Body as Body
-from .export.dressed import crop_body as crop_body
 from .export.dressed import dress as dress
 from .export.dxf import write_dxf as write_dxf
 from .export.figure import DPI as DPI

@@ -9,24 +9,24 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import latest_file
-from warpflat.garment.draping.body import SKIN
+from warpflat.core import FloatArray, latest_file
 from warpflat.garment.draping.result import Drape
 from warpflat.pattern import (
+    ENERGY,
     PIXELS_AROUND,
     SIDES,
+    SKIN,
     Body,
     Scale,
     Shot,
     begin_stage,
     corner_mean,
-    crop_body,
     define_group,
     define_mesh,
+    dress,
     export_stage,
     last_values_as_defaults,
     linear_rgb,
-    make_facets,
     on_paper,
     part_path,
     set_face_map,
@@ -108,7 +108,7 @@ def write_drape_frames(path: Path, drape: Drape) -> None:
         body.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set([Gf.Vec3f(*linear_rgb(SKIN).tolist())])
         cloth = define_mesh(stage, "/World/drape/cloth", drape.cloth.faces)
         colours = cloth.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
-        scale = Scale.from_zero(drape.gap, drape.areas, _LEAST_GAP)
+        scale = Scale.from_zero(drape.gap, drape.areas, _LEAST_GAP, ENERGY)
         colours.GetAttr().SetCustomData({"quantity": "gap", "unit": "m", "rangeMin": 0.0, "rangeMax": scale.high})
         for time, number in enumerate(chosen, start=begin):
             points = drape.frames[number].astype(np.float64)
@@ -135,24 +135,24 @@ def write_drape_film(path: Path, drape: Drape) -> None:
     """
     from PIL import Image
 
-    scale = Scale.from_zero(drape.gap, drape.areas, _LEAST_GAP)
-    faces = np.column_stack([drape.body.triangles, np.full(len(drape.body.triangles), -1)])
-    everything = np.concatenate(drape.frames).astype(np.float64)
-    near, inner = crop_body(Body(vertices=drape.body.shrunk, faces=faces), everything)
-    count = len(drape.frames[0])
-    body = np.column_stack([near + count, np.full(len(near), -1)])
-    facets = make_facets(np.concatenate([drape.cloth.faces, body]).astype(np.int32))
+    scale = Scale.from_zero(drape.gap, drape.areas, _LEAST_GAP, ENERGY)
+    first, everything = (rows.astype(np.float64) for rows in (drape.frames[0], np.concatenate(drape.frames)))
+    body = Body(vertices=drape.body.shrunk, faces=drape.body.triangles)
+    dressed, facets, count = dress(body, first, drape.cloth.faces, room=everything)
+    inner = dressed[len(first) :]
     # All frames show the same room, as high as the picture.
-    shown = np.concatenate([everything, inner[np.unique(near)]])
+    shown = np.concatenate([everything, dressed[facets.used]])
     per_metre = (_HEIGHT - 2 * PIXELS_AROUND) / float(np.ptp(shown[:, 1]))
-    skin, pictures = np.tile(SKIN, (len(near), 1)), []
+    rooms = dict[float, FloatArray]()
+    for _, degrees in SIDES:
+        rooms[degrees] = shown @ view_from_side(dressed, facets, degrees).directions.T
+    skin, pictures = np.tile(SKIN, (count, 1)), []
     for number in choose_frames(drape.frames):
         points = drape.frames[number].astype(np.float64)
         colours = np.concatenate([scale.rgb(corner_mean(drape.body.gaps(points), drape.cloth.faces)), skin])
         sides = []
-        for _, degrees in SIDES:
+        for degrees, room in rooms.items():
             view = view_from_side(np.concatenate([points, inner]), facets, degrees)
-            room = view_from_side(shown, facets, degrees).points
             shot = Shot(view, per_metre, low=room.min(axis=0), size=np.ptp(room, axis=0))
             sides.append(on_paper(shot.pixels(colours)))
         pictures.append(Image.fromarray(np.concatenate(sides, axis=1)))

@@ -8,11 +8,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from warpflat.core import FloatArray
-from warpflat.garment.draping.body import SKIN
 from warpflat.garment.draping.result import Drape
 from warpflat.pattern import (
     PAGE_WIDTH,
     SIDES,
+    SKIN,
     Body,
     Facets,
     Scale,
@@ -86,8 +86,7 @@ def _maps(drapes: list[Drape]) -> dict[str, tuple[list[FloatArray], Scale]]:
 
 def _dressed(drape: Drape) -> tuple[FloatArray, Facets, FloatArray]:
     """Return vertices and facets of the worn cloth and of the body around it, and the colours of the body's faces."""
-    triangles = drape.body.triangles
-    body = Body(vertices=drape.body.shrunk, faces=np.column_stack([triangles, np.full(len(triangles), -1)]))
+    body = Body(vertices=drape.body.shrunk, faces=drape.body.triangles)
     points, facets, count = dress(body, drape.positions, drape.cloth.faces)
     return points, facets, np.tile(SKIN, (count, 1))
 
@@ -108,9 +107,9 @@ def _write_maps(
     aside = 0.5 * (room - per_metre * float(sizes[:, 0].sum()))
     bottom = len(maps) * (tall + _TOP) + _MARGIN
     with drawn_page(path, PAGE_WIDTH, bottom + (_MARGIN if title else 0.0)) as pen:
-        pen.write(_MARGIN, bottom + 0.05, title, 11)
+        pen.write(_MARGIN, bottom + 0.1, title, 11)
         for name, (values, scale) in maps.items():
-            pen.write(_MARGIN, bottom - _MARGIN + 0.05, name, 11, fontweight="bold")
+            pen.write(_MARGIN, bottom - 0.14, name, 11, fontweight="bold")
             bottom -= tall + _TOP
             colours = [np.concatenate([scale.rgb(each), skin]) for each, skin in zip(values, skins, strict=True)]
             left = _MARGIN + aside

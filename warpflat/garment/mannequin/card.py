@@ -12,7 +12,7 @@ import numpy as np
 from warpflat.core import IntArray
 from warpflat.garment.mannequin.bricks import TRUNK_LEVELS
 from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS
-from warpflat.pattern import GREY, DrawnView, drawn_page, make_facets, view_from_side
+from warpflat.pattern import GREY, SKIN, DrawnView, drawn_page, make_facets, view_from_side
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.mannequin import Mannequin
@@ -56,7 +56,7 @@ _LINES = {
 }  # fmt: skip
 _BEHIND = ("back_width", "armscye_depth", "nape_to_waist")
 _PAGE = (8.27, 11.69)  # [in], A4
-_BODY, _LINE = (0.93, 0.90, 0.84), "#9c1f30"
+_LINE = "#9c1f30"
 _HEIGHT, _TOP = 5.0, 10.75  # of the figures, and where they begin [in]
 
 
@@ -139,7 +139,7 @@ def write_measurement_card(
                 bottom=_TOP - _HEIGHT,
                 inches_per_metre=scale,
             )
-            drawn.draw(np.tile(_BODY, (len(faces), 1)))
+            drawn.draw(np.tile(SKIN, (len(faces), 1)))
             tapes = {
                 name: drawn.to_page(view.points[ids]) for name in names if (ids := _tape(mannequin, name)) is not None
             }

@@ -14,6 +14,7 @@ from warpflat.garment.mannequin.layout import LEG_LINES, RING_LEVELS
 from warpflat.pattern import (
     INK,
     SIDES,
+    SKIN,
     DrawnView,
     Pen,
     Scale,
@@ -31,7 +32,7 @@ __all__ = ["signed_distances", "write_distance_picture", "write_mannequin_pictur
 
 _VIEWS = (("front", 0.0), ("three-quarter", 38.0), ("left side", 90.0), ("back", 180.0))
 _HEIGHT, _GAP = 8.0, 0.2  # of the page, and between views [in]
-_BODY, _LINE, _LEADER = (0.93, 0.90, 0.84), "#9c1f30", (*INK, 0.65)
+_LINE, _LEADER = "#9c1f30", (*INK, 0.65)
 # A line is not drawn where it turns from the eye: there it slips along the outline.
 _FACING = 0.12
 # Ends of the scale of distances [mm]; what lies farther has the colour of the ends.
@@ -60,7 +61,7 @@ def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) 
             drawn = DrawnView(
                 pen, view, left=corner, bottom=0.01 * _HEIGHT + 0.02 * span * scale, inches_per_metre=scale
             )
-            drawn.draw(np.tile(_BODY, (len(faces), 1)))
+            drawn.draw(np.tile(SKIN, (len(faces), 1)))
             towards = vertex_normals(view.points, faces)[:, 2] > _FACING
             for ids in mannequin.layout.body_lines.values():
                 edges = np.column_stack([ids[:-1], ids[1:]])

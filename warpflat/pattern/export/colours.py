@@ -11,8 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.core import FloatArray, IntArray, weighted_percentile
 
 __all__ = [
+    "DRAFTED_CLOTH",
     "ENERGY",
     "SHARE",
+    "SKIN",
     "SMALLEST_SCALE",
     "Scale",
     "VertexColours",
@@ -23,6 +25,8 @@ __all__ = [
 
 #: The name of this module's own colour map.
 ENERGY = "energy"
+#: Colours of bodies, and of cloth that was drafted and bears no map, sRGB.
+SKIN, DRAFTED_CLOTH = (0.88, 0.86, 0.82), (0.62, 0.64, 0.68)
 #: Of the cloth, by area, within a scale: a few sliver faces would otherwise make the rest of a map pale.
 SHARE = 0.98
 
@@ -71,9 +75,9 @@ class Scale:
     colours: str = ENERGY
 
     @classmethod
-    def from_zero(cls, values: FloatArray, areas: FloatArray, least: float) -> Scale:
+    def from_zero(cls, values: FloatArray, areas: FloatArray, least: float, colours: str = "YlOrRd") -> Scale:
         """Return the scale from 0 to a value that `SHARE` of the area does not pass, or to the `least` end."""
-        return cls(high=max(least, weighted_percentile(values, areas, SHARE)), colours="YlOrRd")
+        return cls(high=max(least, weighted_percentile(values, areas, SHARE)), colours=colours)
 
     @classmethod
     def both_ways(cls, values: FloatArray, areas: FloatArray, least: float, most: float = np.inf) -> Scale:

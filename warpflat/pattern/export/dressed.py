@@ -25,19 +25,27 @@ class Body:
 
     Attributes:
         vertices: #V by 3 [m], Y up, facing +Z.
-        faces: #F by 4.
+        faces: #F by 3 or 4.
     """
 
     vertices: FloatArray
     faces: IntArray
 
 
-def dress(body: Body, worn: FloatArray, faces: IntArray) -> tuple[FloatArray, Facets, int]:
-    """Return a worn garment (#P by 3, #F by 4) and then the body around it: vertices, facets, and how many faces the body has.
+def dress(
+    body: Body, worn: FloatArray, faces: IntArray, room: FloatArray | None = None
+) -> tuple[FloatArray, Facets, int]:
+    """Return a worn garment and then the body around it: vertices, facets, and how many faces the body has.
 
     Outlines of pieces, which have vertices of their own, show the seams; the body has none.
+
+    Args:
+        body: under it.
+        worn: #P by 3, the garment's vertices [m].
+        faces: #F by 4.
+        room: places around which the body is shown (#N by 3 [m]); those of the garment if not given.
     """
-    near, skin = crop_body(body, worn)
+    near, skin = crop_body(body, worn if room is None else room)
     all_faces = np.concatenate([faces, np.column_stack([near + len(worn), np.full(len(near), -1)])])
     return np.concatenate([worn, skin]), make_facets(all_faces.astype(np.int32), outline_edges(faces)), len(near)
 

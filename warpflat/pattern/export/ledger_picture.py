@@ -13,7 +13,7 @@ from warpflat.flat import join_surfaces
 from warpflat.pattern.export.colours import Scale, energy_scale
 from warpflat.pattern.export.figure import GREY, INK, PAGE_WIDTH, drawn_page
 from warpflat.pattern.export.geometry import polylines_of
-from warpflat.pattern.export.views import DrawnView, make_facets, surface_view, view_from_side
+from warpflat.pattern.export.views import draw_row, make_facets, surface_view, view_from_side
 
 if TYPE_CHECKING:
     from warpflat.flat import Ledger, LedgerEntry
@@ -50,11 +50,14 @@ def write_ledger_picture(path: str | os.PathLike[str], ledger: Ledger) -> None:
     entries = ledger.entries[:_MOST]
     surface = join_surfaces([piece.surface for piece in ledger.pieces])
     density = np.concatenate([piece.face_energy_density for piece in ledger.pieces])
-    facets, centre = make_facets(surface.faces), surface.vertices.mean(axis=0)
-    views = [surface_view(surface, facets, polylines_of({}))]
+    facets = make_facets(surface.faces)
+    views = {"": surface_view(surface, facets, polylines_of({}))}
     if len(ledger.pieces) > 1:  # around a body
-        views = [view_from_side(surface.vertices - centre, facets, degrees) for degrees in (0.0, 180.0)]
-    sizes = np.array([view.size[:2] for view in views])
+        views = {
+            "front": view_from_side(surface.vertices, facets, 0.0),
+            "back": view_from_side(surface.vertices, facets, 180.0),
+        }
+    sizes = np.array([view.size[:2] for view in views.values()])
     per_metre = min((_BODY - _GAP * (len(views) - 1)) / float(sizes[:, 0].sum()), 5.2 / float(sizes[:, 1].max()))
     tall = max(float(sizes[:, 1].max()) * per_metre + 0.7, _ROW * (len(entries) + 2))
     height = tall + 1.15
@@ -66,22 +69,17 @@ def write_ledger_picture(path: str | os.PathLike[str], ledger: Ledger) -> None:
         pen.write(0.45, height - 0.64, f"{stored}; highest density: {peak}", 9.5, color=GREY)
         areas = np.concatenate([piece.worn.area for piece in ledger.pieces])
         colours = Scale(high=energy_scale(density, areas)).rgb(density)
-        shown, left = list[DrawnView](), 0.45
-        for view, (wide, high) in zip(views, sizes * per_metre, strict=True):
-            shown.append(
-                DrawnView(pen, view, left=left, bottom=height - 1.15 - float(high), inches_per_metre=per_metre)
-            )
-            shown[-1].draw(colours)
-            left += float(wide) + _GAP
-        # The views' directions, found again from what they did to the vertices.
-        turns = [np.linalg.lstsq(surface.vertices - centre, view.points, rcond=None)[0] for view in views]
+        bottom = height - 1.15 - float(sizes[:, 1].max()) * per_metre
+        shown = draw_row(
+            pen, views, [colours] * len(views), left=0.45, bottom=bottom, inches_per_metre=per_metre, gap=_GAP
+        )
         placed: list[FloatArray] = []
         labels: dict[tuple[float, float], list[str]] = {}
         for number, entry in reversed(list(enumerate(entries, start=1))):
             ink = _INKS[(number - 1) % len(_INKS)]
             for points in entry.paths:
                 # In the view on whose side of the body it lies.
-                seen = [(points - centre) @ turn for turn in turns]
+                seen = [points @ view.directions.T for view in views.values()]
                 nearest = int(np.argmax([float(each[:, 2].mean()) for each in seen]))
                 page = shown[nearest].to_page(seen[nearest])
                 pen.line(page, width=1.4, colour=ink, halo=True)

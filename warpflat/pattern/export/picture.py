@@ -13,7 +13,7 @@ import numpy as np
 from warpflat.core import FloatArray, IntArray
 from warpflat.flat import Surface
 from warpflat.pattern.drafting.placement import LabelRoom, Spot
-from warpflat.pattern.export.colours import SMALLEST_SCALE, Scale, energy_scale
+from warpflat.pattern.export.colours import DRAFTED_CLOTH, SKIN, SMALLEST_SCALE, Scale, energy_scale
 from warpflat.pattern.export.dressed import Body, dress
 from warpflat.pattern.export.figure import GRAIN, GREY, INK, LABEL_SIZE, MARGIN, PAGE_WIDTH, Pen, drawn_page
 from warpflat.pattern.export.geometry import face_areas, polylines_of
@@ -53,7 +53,6 @@ _SHORTEST_GRAIN = 0.28  # half its length
 _BAND_SCALES, _BAND_TALLEST, _BAND_HEAD, _BAND_FOOT, _BAND_GAP = (1.0, 0.9, 0.8, 0.7), 9.0, 0.26, 0.30, 0.25
 # It lies on the mannequin: it is drawn this much nearer to the eye, and drafted pieces, such as patches, over it [m].
 _NEARER, _OVER = 0.012, 0.004
-_SKIN, _DRAFTED = (0.88, 0.86, 0.83), (0.62, 0.64, 0.68)
 # Drafted outlines: their colour, their heading, room for a name above each, and gaps between them.
 _CLOTH, _ROWS_HEADING, _NAME, _GAP, _NAME_SIZE = (0.95, 0.94, 0.91), 0.36, 0.20, 0.22, 8.0
 
@@ -344,7 +343,7 @@ class _Band:
             view.points[: len(worn), 2] += _NEARER
             view.points[counts[len(flattened)] : len(worn), 2] += _OVER
         density = np.concatenate([np.asarray(piece.face_energy_density, dtype=np.float64) for piece in pieces])
-        plain = np.tile(_DRAFTED, (sum(len(surface.faces) for surface in others), 1)), np.tile(_SKIN, (skin, 1))
+        plain = np.tile(DRAFTED_CLOTH, (sum(len(surface.faces) for surface in others), 1)), np.tile(SKIN, (skin, 1))
         self._colours = np.concatenate([scale.rgb(density), *plain])
         # What the body shows of drafted pieces, and which lie within the garment.
         within = dict.fromkeys(each.name.partition(", ")[0] for each in drafted if not each.worn)

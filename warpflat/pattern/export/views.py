@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -84,12 +84,14 @@ class View:
         lines: feature lines, each a list of vertex-index arrays.
         vectors: #T by 3, the normals of the triangles in the view's directions, as long as their areas [m2]; None for a
             flat pattern, which needs no light and hides nothing.
+        directions: 3 by 3, where right, up and the viewer are in space.
     """
 
     points: FloatArray
     facets: Facets
     lines: Mapping[str, list[IntArray]]
     vectors: FloatArray | None
+    directions: FloatArray = field(default_factory=lambda: np.eye(3))
 
     @cached_property
     def low(self) -> FloatArray:
@@ -131,8 +133,7 @@ def surface_view(surface: Surface, facets: Facets, lines: Mapping[str, list[IntA
     right = np.cross(upwards, towards)
     right /= np.linalg.norm(right)
     directions = np.array([right, np.cross(towards, right), towards])
-    centred = surface.vertices - surface.vertices.mean(axis=0)
-    return View(points=centred @ directions.T, facets=facets, lines=lines, vectors=vectors @ directions.T)
+    return _seen(surface.vertices, facets, directions, lines)
 
 
 def pattern_view(positions: FloatArray, facets: Facets, lines: Mapping[str, list[IntArray]]) -> View:
@@ -144,8 +145,13 @@ def pattern_view(positions: FloatArray, facets: Facets, lines: Mapping[str, list
 def view_from_side(points: FloatArray, facets: Facets, degrees: float) -> View:
     """Return a mesh (#V by 3) as seen by somebody who walked `degrees` around it to its left."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    seen = points @ np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]).T
-    return View(points=seen, facets=facets, lines={}, vectors=area_vectors(seen, facets.triangles))
+    return _seen(points, facets, np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]), {})
+
+
+def _seen(points: FloatArray, facets: Facets, directions: FloatArray, lines: Mapping[str, list[IntArray]]) -> View:
+    seen = points @ directions.T
+    vectors = area_vectors(seen, facets.triangles)
+    return View(points=seen, facets=facets, lines=lines, vectors=vectors, directions=directions)
 
 
 class Shot:
