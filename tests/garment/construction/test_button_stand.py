@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from warpflat.garment.construction.finishing import Finishing
 from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.linings import add_interfacing
-from warpflat.garment.construction.openings import Buttons, Opening, part_at_centres
+from warpflat.garment.construction.openings import Buttons, Opening, OpeningPart, part_at_centres, place_opening
 from warpflat.garment.construction.to_pattern import pattern_of_garment
 from warpflat.garment.mannequin.forms import shipped_form
 from warpflat.pattern.drafting.draft import draft_garment
@@ -124,6 +125,16 @@ def test_stand_of_a_part_of_the_seam_leaves_the_rest_sewn(bodice: Garment):
     full = pattern_of(bodice).piece("front_left", "").edge("centre front").length
     assert front.edge("centre front").length == pytest.approx(full - 0.2, abs=1e-3)
     assert all(seam.matches for seam in draft_garment(pattern).seams)
+
+
+def test_a_stand_all_along_an_edge_ends_with_it(bodice: Garment, monkeypatch: pytest.MonkeyPatch):
+    """Points are rounded to a micrometre, so that an edge and its seam on the layout differ."""
+
+    def shorter(*given: Any) -> list[OpeningPart]:
+        return [replace(part, whole=part.whole - 3e-6) for part in place_opening(*given)]
+
+    monkeypatch.setattr("warpflat.garment.construction.to_pattern.place_opening", shorter)
+    assert "centre front" not in {edge.name for edge in pattern_of(bodice, BUTTONED).piece("front_left", "").edges}
 
 
 def test_buttons_keep_to_the_count_of_another_size():

@@ -190,9 +190,11 @@ def _with_buttons(pattern: Pattern, seam: Seam, opening: Opening, number: int, p
         depths = button_depths(opening.buttons, length, None if bust is None else part.before + bust, *counts)
         counts = [len(depths)]
         here = depths[(depths >= part.before) & (depths < part.before + part.whole)] - part.before
+        # All along an edge that is rounded it ends with that.
+        end = np.inf if opening.length >= whole else length - part.before
         for name, edge in sides:
             pieces[size] = [
-                with_button_stand(each, edge, opening, length - part.before, here) if each.name == name else each
+                with_button_stand(each, edge, opening, end, here) if each.name == name else each
                 for each in pieces[size]
             ]
     at = pattern.piece(*(next(iter(sides))[0], pattern.sample)).edge(next(iter(sides))[1]).length
