@@ -27,10 +27,10 @@ __all__ = ["girth_constraints", "pattern_girths"]
 
 
 def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]) -> list[KeptGirth]:
-    """Return constraints that give every level the ease that a form asks for, and armholes with sleeves their length.
+    """Return constraints that give every level the ease that a form asks for, and armholes the length that was drafted.
 
     Cloth at rest loses some of the ease to strain, or has more elsewhere. An armhole gives way to the longer cap that is
-    eased into it.
+    eased into it, and to the ease that is kept below it.
 
     Args:
         mannequin: the body.
@@ -38,7 +38,6 @@ def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping
         positions: by piece, #V by 2, at rest without these constraints [m].
     """
     layout, piece_edges = mannequin.layout, PieceEdges(mannequin.layout, form)
-    sleeves = np.concatenate([np.empty(0), *(form.pieces[cap].grid_vertices for cap in _caps(layout, form))])
     limbs = {name: (row, axis) for (name, _), row, _, axis in body_rows(mannequin)}
     lines = _lines(layout, form)
     found = []
@@ -46,7 +45,7 @@ def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping
         if "ease_wanted_m" in girth:
             edges = piece_edges.along(*([_row(layout, level)] if level in RING_LEVELS else limbs[level]))
             factor = (girth["body_m"] + girth["ease_wanted_m"]) / girth["pattern_m"]
-        elif level in lines and np.isin(lines[level][0], sleeves).all():
+        elif level in lines and level != "neck":
             edges = lines[level][1]
             factor = girth["form_m"] / girth["pattern_m"]
         else:
