@@ -27,7 +27,7 @@ __all__ = ["girth_constraints", "pattern_girths"]
 
 
 def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]) -> list[KeptGirth]:
-    """Return constraints that give every level the ease that a form asks for, and armholes the length that was drafted.
+    """Return constraints that give every level the ease that a form asks for, and armholes at most their drafted length.
 
     Cloth at rest loses some of the ease to strain, or has more elsewhere. An armhole gives way to the longer cap that is
     eased into it, and to the ease that is kept below it.
@@ -47,7 +47,8 @@ def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping
             factor = (girth["body_m"] + girth["ease_wanted_m"]) / girth["pattern_m"]
         elif level in lines and level != "neck":
             edges = lines[level][1]
-            factor = girth["form_m"] / girth["pattern_m"]
+            # What is cut to be worn stretched is shorter.
+            factor = min(1.0, girth["form_m"] / girth["pattern_m"])
         else:
             continue
         assert edges is not None
