@@ -172,28 +172,26 @@ def _with_finish(
         count = 2 if any(without_side(edge) != edge for _, edge in places) else 1
         elastic = Elastic(edge=wish.edge, width=wish.width, lengths=lengths, count=count)
         pattern = replace(pattern, elastics=(*pattern.elastics, elastic))
-    is_drafted = wish.collar is not None and wish.collar.style != "turtleneck"
-    breaks: list[Break] = []
-    if wish.placket and wish.kind not in ("facing", "hood", "flounce", "casing") and (is_drafted or not wish.shaped):
-        # In the centre front below a collar, behind in a sleeve.
-        if is_drafted:
-            pattern, breaks = with_placket(pattern, places, wish.placket, wish.edge)
-        else:
-            pattern, breaks = with_slits(pattern, places, wish.placket, "sleeve")
-        pattern, places = _opened_up(pattern, wish.edge)
+    collar, breaks = wish.collar, list[Break]()
     if wish.kind == "facing":
         return with_facings(pattern, places, wish.width, gaps=gaps, stands=stands)
-    if wish.kind == "hood" and wish.collar is not None:
+    if collar is not None and wish.kind == "hood":
         heads = {size: _girth_at(size, ["head"], girths) for size in pattern.pieces}
-        return with_hood(pattern, places, wish.collar, heads, gaps=gaps)
-    if is_drafted:
-        return with_collar(pattern, places, wish.collar, gaps=gaps, breaks=breaks)
+        return with_hood(pattern, places, collar, heads, gaps=gaps)
+    if collar is not None and collar.style != "turtleneck":
+        if wish.placket:
+            pattern, breaks = with_placket(pattern, places, wish.placket, wish.edge)
+            pattern, places = _opened_up(pattern, wish.edge)
+        return with_collar(pattern, places, collar, gaps=gaps, breaks=breaks)
     if wish.kind == "casing":
         # Turned in, with an allowance of its width, and the edge turned in once more.
-        turned = {"kind": "hem", "allowance": wish.width + _NARROW}
-        return _with_changed_edges(pattern, places, lambda piece, edge: replace(edge, **turned))
+        wide = wish.width + _NARROW
+        return _with_changed_edges(pattern, places, lambda piece, edge: replace(edge, kind="hem", allowance=wide))
     if wish.shaped:
         return with_shaped_waistband(pattern, places, wish.width, gaps=gaps)
+    if wish.placket and wish.kind != "flounce":
+        pattern, breaks = with_slits(pattern, places, wish.placket, "sleeve")
+        pattern, places = _opened_up(pattern, wish.edge)
     for chain, count in free_chains(pattern, places, gaps, breaks):
         if wish.kind == "flounce":
             pattern = with_flounce(pattern, chain, wish.width, wish.turns, wish.edge, cloth_width)
@@ -202,9 +200,9 @@ def _with_finish(
     return pattern
 
 
-def hem_rises(pattern: Pattern, finishing: Sequence[Finishing]) -> dict[tuple[str, str], tuple[FloatArray, FloatArray]]:
+def hem_rises(pattern: Pattern, finishing: Sequence[Finishing]) -> dict[Place, tuple[FloatArray, FloatArray]]:
     """Return how wide a strip slanted hems lose in the sample size, as :func:`slant_rises` gives it."""
-    found = dict[tuple[str, str], tuple[FloatArray, FloatArray]]()
+    found = dict[Place, tuple[FloatArray, FloatArray]]()
     for wish in finishing:
         if isinstance(wish.shorten, Mapping):
             places = _opened_up(pattern, wish.edge, sewn_there=False)[1]

@@ -246,32 +246,26 @@ def joined_line(pattern: Pattern, chain: FreeChain, size: str, *, lapped: float 
         size: of the pieces.
         lapped: by how much pieces are turned over each other at the seams [rad], as for a collar that is to roll.
     """
-    lines, corners = list[FloatArray](), list[tuple[str, float, float]]()
+    line, before, ray = np.empty((0, 2)), ("", False, ""), np.zeros(2)
     for side in chain.sides:
         piece = pattern.piece(side.piece, size)
-        points = side_points(pattern, side, size)
-        # The corners of the edge: its neighbours there, and the angles of the cloth.
-        angles = []
-        for end in (0, 1):
-            name, at = neighbour(piece, side.edge, end)
-            beside = piece.edge(name).points[:: -1 if at else 1]
-            own = piece.edge(side.edge).points[:: -1 if end else 1]
-            (x, y), (u, v) = _heading(own), _heading(beside)
-            angles.append((name, abs(float(np.arctan2(x * v - y * u, x * u + y * v)))))
-        angles = angles[::-1] if side.reversed else angles
-        corners.append((angles[1][0], angles[0][1], angles[1][1]))
         # Walked against its own direction, an edge has the cloth to its right; so has a copy that is turned over, walked along it.
-        lines.append(points * [1.0, -1.0] if side.reversed else points)
-    line = lines[0]
-    for number, points in enumerate(lines[1:], start=1):
-        ahead, first = -_heading(line[::-1]), _heading(points)
-        name, _, leaving = corners[number - 1]
-        before, side = chain.sides[number - 1], chain.sides[number]
-        on_one_piece = (before.piece, before.mirrored, name) == (side.piece, side.mirrored, side.edge)
-        turn = np.pi - leaving - (0.0 if on_one_piece else corners[number][1] - lapped)
-        by = turn + float(np.arctan2(ahead[1], ahead[0]) - np.arctan2(first[1], first[0]))
-        rotation = np.array([[np.cos(by), np.sin(by)], [-np.sin(by), np.cos(by)]])
-        line = np.vstack([line, line[-1] + (points[1:] - points[0]) @ rotation])
+        flip = np.array([1.0, -1.0 if side.reversed else 1.0])
+        points = side_points(pattern, side, size) * flip
+        # The edges that meet it at both ends, and how they run from there.
+        names, at = zip(*(neighbour(piece, side.edge, end != side.reversed) for end in (0, 1)), strict=True)
+        rays = [
+            _heading(piece.edge(name).points[:: -1 if end else 1]) * flip for name, end in zip(names, at, strict=True)
+        ]
+        if not len(line):
+            line = points
+        else:
+            goes_on = before == (side.piece, side.mirrored, side.edge)
+            (x, y), (u, v) = _heading(points) if goes_on else rays[0], ray
+            by = float(np.arctan2(x * v - y * u, x * u + y * v)) + (0.0 if goes_on else lapped)
+            rotation = np.array([[np.cos(by), np.sin(by)], [-np.sin(by), np.cos(by)]])
+            line, rays[1] = np.vstack([line, line[-1] + (points[1:] - points[0]) @ rotation]), rays[1] @ rotation
+        before, ray = (side.piece, side.mirrored, names[1]), rays[1]
     return line
 
 

@@ -148,27 +148,27 @@ def _with_zip(pattern: Pattern, seam: Seam, opening: Opening, parts: _Parts, *, 
         pattern = with_pieces(pattern, [beside_edge(piece, side.edge) for piece in in_sizes(pattern, side.piece)])
     if not ends:
         return pattern
-    side, by_size = seam.sides[0][0], {}
-    down = downwards(pattern.piece(side.piece, pattern.sample), side.edge)[1] != side.reversed
-    for size in pattern.pieces:
-        part = _part_of(parts[size], seam)
-        share = _reach(opening, part)[1] / part.whole
-        by_size[size] = with_notches(seam.of_size(size), [share if down else 1.0 - share], part.whole)
-    return _with_seam(pattern, replace(seam, notches=by_size[pattern.sample], size_notches=by_size))
+    return with_notches(pattern, seam, {size: [_reach(opening, _part_of(row, seam))[1]] for size, row in parts.items()})
 
 
-def with_notches(seam: Seam, shares: Sequence[float], whole: float) -> tuple[float, ...]:
-    """Return the notches of a seam (shares of its length) with some more, which its own keep clear of.
+def with_notches(pattern: Pattern, seam: Seam, lengths: Mapping[str, Sequence[float]]) -> Pattern:
+    """Return a pattern with more notches in a seam, which its own keep clear of; if it has none, those are spaced as on any seam.
 
     Args:
-        seam: given notches, or none: then they are spaced as on any seam.
-        shares: of the new ones.
-        whole: length of the seam [m].
+        pattern: with the seam.
+        seam: whose first side runs along one edge or more.
+        lengths: by size, from the upper end of the seam [m].
     """
-    count = max(1, round(whole / _SPACING))
-    spaced = seam.notches if seam.notches is not None else [(k + 0.42) / count for k in range(count)]
-    kept = [each for each in spaced if np.abs(each - np.asarray(shares)).min() * whole > _CLEAR]
-    return tuple(sorted([*shares, *kept]))
+    row, by_size = seam.sides[0], dict[str, tuple[float, ...]]()
+    down = downwards(pattern.piece(row[0].piece, pattern.sample), row[0].edge)[1]
+    for size, at in lengths.items():
+        whole = sum(pattern.piece(side.piece, size).edge(side.edge).length for side in row)
+        shares = np.asarray(at) / whole if down != row[0].reversed else 1.0 - np.asarray(at) / whole
+        count, given = max(1, round(whole / _SPACING)), seam.of_size(size).notches
+        spaced = given if given is not None else [(k + 0.42) / count for k in range(count)]
+        kept = [each for each in spaced if np.abs(each - shares).min() * whole > _CLEAR]
+        by_size[size] = tuple(sorted([*shares.tolist(), *kept]))
+    return _with_seam(pattern, replace(seam, notches=by_size[pattern.sample], size_notches=by_size))
 
 
 def _with_buttons(pattern: Pattern, seam: Seam, opening: Opening, parts: _Parts) -> Pattern:

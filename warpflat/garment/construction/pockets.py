@@ -381,21 +381,13 @@ def _with_bags(pattern: Pattern, pocket: Pocket) -> Pattern:
     joined = [pattern.piece(side.piece, pattern.sample) for row in opened[0].sides for side in row]
     both = 4 if len(opened) == 2 or any(piece.on_fold or piece.quantity % 2 == 0 for piece in joined) else 2
     title = free_piece_name(pattern, "pocket_bag")
-    seams = []
-    for seam in pattern.seams:
-        if seam.name in names:
-            # Notches at both ends of the opening.
-            side, by_size = seam.sides[0][0], {}
-            for size in pattern.pieces:
-                piece = pattern.piece(side.piece, size)
-                whole = piece.edge(side.edge).length
-                stretch = np.array([pocket.below, pocket.below + pocket.height])
-                _check_end(stretch[1], seam.name, whole)
-                shares = stretch / whole if downwards(piece, side.edge)[1] != side.reversed else 1.0 - stretch / whole
-                by_size[size] = with_notches(seam.of_size(size), shares.tolist(), whole)
-            seam = replace(seam, notches=by_size[pattern.sample], size_notches=by_size)
-        seams.append(seam)
-
+    ends = [pocket.below, pocket.below + pocket.height]
+    for seam in opened:
+        first = seam.sides[0][0]
+        for piece in in_sizes(pattern, first.piece):
+            _check_end(ends[1], seam.name, piece.edge(first.edge).length)
+        # Notches at both ends of the opening.
+        pattern = with_notches(pattern, seam, dict.fromkeys(pattern.pieces, ends))
     side = opened[0].sides[0][0]
 
     def bag(piece: Piece) -> Piece:
@@ -422,5 +414,5 @@ def _with_bags(pattern: Pattern, pocket: Pocket) -> Pattern:
             grain=np.array([[-0.5 * deep, 0.1 * length], [-0.5 * deep, 0.7 * length]]),
         )  # fmt: skip
 
-    pattern = with_pieces(replace(pattern, seams=seams), map(bag, in_sizes(pattern, side.piece)))
+    pattern = with_pieces(pattern, map(bag, in_sizes(pattern, side.piece)))
     return copies_sewn(pattern, "pocket bag", title, "rim")

@@ -118,8 +118,8 @@ def with_shaped_waistband(
         pattern = with_pieces(pattern, made)
         before, after = beside(whole, edge)
         cut |= {(name, before): (title, False), (name, after): (title, True)}
-        sides = SeamSide(piece=name, edge=f"{edge} seam"), SeamSide(piece=title, edge=INNER, reversed=True)
-        pattern = sewn(pattern, title.replace("_", " "), *sides, notches=centre_notch(whole))
+        upper, lower = SeamSide(piece=title, edge=INNER, reversed=True), SeamSide(piece=name, edge=f"{edge} seam")
+        pattern = sewn(pattern, title.replace("_", " "), lower, upper, notches=centre_notch(whole))
     for seam in shell.seams:
         both = [row[0] for row in seam.sides]
         if opened_in(shell, seam, gaps) or any(
