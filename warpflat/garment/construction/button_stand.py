@@ -9,6 +9,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, InputError, arc_lengths, find_unused_name, part_between
 from warpflat.garment.construction.edges import (
+    ON_EDGE,
     backwards,
     beside,
     direction,
@@ -138,7 +139,7 @@ def with_wrap(piece: Piece, name: str, opening: Opening) -> Piece:
     if upper.name == "neck":
         corner, line = foot[-1], shapely.LineString(centre)
         waists = [each[[0, -1]] for key, each in piece.internal_lines.items() if key.startswith("waist")]
-        crossed = [end for ends in waists for end in ends if line.distance(shapely.Point(end)) < 1e-3]
+        crossed = [end for ends in waists for end in ends if line.distance(shapely.Point(end)) < ON_EDGE]
         head = np.array([upper.points[0], crossed[0] + opening.width * out if crossed else corner])
     else:
         head = np.vstack([upper.points, reflected(upper, upper.points[::-1])[1:]])
@@ -215,6 +216,6 @@ def bust_depth(piece: Piece, name: str) -> float | None:
     edge = shapely.LineString(downwards(piece, name)[0])
     for line in (line for key, line in piece.internal_lines.items() if key.startswith("bust")):
         for end in line[[0, -1]]:
-            if edge.distance(shapely.Point(end)) < 1e-3:
+            if edge.distance(shapely.Point(end)) < ON_EDGE:
                 return float(edge.project(shapely.Point(end)))
     return None

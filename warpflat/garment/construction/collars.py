@@ -7,11 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, part_between, polyline_length
+from warpflat.core import InputError, part_between, polyline_length
 from warpflat.garment.construction.button_stand import buttonhole
 from warpflat.garment.construction.edges import (
     Place,
@@ -121,11 +120,12 @@ def with_collar(
     if collar.style in ("stand", "shirt"):
         return _with_stand(pattern, chains[0], collar)
     draw = _flat_edges if collar.style == "flat" else _convertible_edges
-    pattern, name = _added(
-        pattern, "collar", {size: draw(pattern, chains[0], collar, size) for size in pattern.pieces},
-        quantity=4 if halves else 2, paired=halves,
-    )  # fmt: skip
-    pattern = _sewn_on(pattern, chains[0], name)
+    name, quantity = free_piece_name(pattern, "collar"), 4 if halves else 2
+    made = [
+        _piece(pattern, name, size, draw(pattern, chains[0], collar, size), quantity=quantity, paired=halves)
+        for size in pattern.pieces
+    ]
+    pattern = _sewn_on(with_pieces(pattern, made), chains[0], name)
     if halves:
         other = SeamSide(piece=name, edge="lower", reversed=True, mirrored=True)
         pattern = sewn(pattern, "collar of the other half", other, chains[1].sides)
@@ -155,14 +155,15 @@ def _with_stand(pattern: Pattern, chain: FreeChain, collar: Collar) -> Pattern:
     """Return a pattern with a stand along the whole neckline, and with the fall that is sewn into its upper edge, if it has one."""
     import shapely
 
-    stands, falls = dict[str, list[Edge]](), dict[str, list[Edge]]()
-    lines, marks = dict[str, dict[str, FloatArray]](), dict[str, dict[str, FloatArray]]()
-    for size in pattern.pieces:
-        length, high, allowance = (
-            chain_length(pattern, chain, size),
-            collar.width,
-            chain_allowance(pattern, chain, size),
+    stand, fall, made = free_piece_name(pattern, "collar_stand"), free_piece_name(pattern, "collar"), list[Piece]()
+    high, covers = collar.width, collar.fall - collar.width
+    if collar.style == "shirt" and covers < _COVERS:
+        raise InputError(
+            f"the fall of a shirt collar hides the seam of its stand: fall_mm = {1e3 * collar.fall:g} must be at least "
+            f"{1e3 * _COVERS:g} more than width_mm = {1e3 * high:g}"
         )
+    for size in pattern.pieces:
+        length, allowance = chain_length(pattern, chain, size), chain_allowance(pattern, chain, size)
         centres = marks_of(pattern, chain, size, "centre front")
         beyond = min((at for at in (*centres, *(length - c for c in centres)) if at < 0.25 * length), default=0.0)
         lower, upper = swept(Strip(length=length, height=high, turn=6.0 * collar.rise / length))
@@ -180,18 +181,14 @@ def _with_stand(pattern: Pattern, chain: FreeChain, collar: Collar) -> Pattern:
             right = np.vstack([right, part_between(top, 0.0, begin)[1:]])
             left = np.vstack([part_between(top, end, polyline_length(top))[:-1], left])
         outline = {"lower": lower, "right end": right, "upper": edge, "left end": left}
-        stands[size] = [Edge(name=name, points=points, allowance=allowance) for name, points in outline.items()]
+        edges = [Edge(name=name, points=points, allowance=allowance) for name, points in outline.items()]
+        made.append(_piece(pattern, stand, size, edges))
         if beyond > 0.01:
             # The button lies on the centre front, and so does the buttonhole at the other end.
             middles, (x, y) = 0.5 * (low + ends), direction(np.array([low[0], ends[0]]))
-            lines[size], marks[size] = buttonhole(middles[0], np.array([y, -x])), {"button": middles[1]}
+            lines = buttonhole(middles[0], np.array([y, -x]))
+            made[-1] = replace(made[-1], internal_lines=lines, marks={"button": middles[1]})
         if collar.style == "shirt":
-            covers = collar.fall - high
-            if covers < _COVERS:
-                raise InputError(
-                    f"the fall of a shirt collar hides the seam of its stand: fall_mm = {1e3 * collar.fall:g} must be at least "
-                    f"{1e3 * _COVERS:g} more than width_mm = {1e3 * high:g}"
-                )
             back, grown = _rests_on(pattern, chain, size, covers)
             # The upper edge of the stand is shorter than the neckline there.
             middle = slice(*(round(count * (0.5 + sign * 0.5 * back / length)) for sign in (-1.0, 1.0)))
@@ -199,11 +196,10 @@ def _with_stand(pattern: Pattern, chain: FreeChain, collar: Collar) -> Pattern:
             length = drawn_length(edge)
             turn = 0.5 * length * max(0.0, grown - own) / (own * collar.fall)
             shape = Strip(length=length, height=collar.fall, turn=-turn, even=True, tip=collar.point, lean=_LEAN)
-            falls[size] = strip_edges(*swept(shape), allowance=allowance)
-    pattern, stand = _added(pattern, "collar_stand", stands, quantity=2, lines=lines, marks=marks)
-    if not falls:
+            made.append(_piece(pattern, fall, size, strip_edges(*swept(shape), allowance=allowance)))
+    pattern = with_pieces(pattern, made)
+    if collar.style != "shirt":
         return _sewn_on(pattern, chain, stand)
-    pattern, fall = _added(pattern, "collar", falls, quantity=2)
     pattern = copies_sewn(pattern, f"{_words(fall)} edge", fall, *_AROUND)
     upper_side = SeamSide(piece=stand, edge="upper", reversed=True)
     pattern = sewn(pattern, "collar to its stand", SeamSide(piece=fall, edge="lower"), upper_side, notches=(0.5,))
@@ -236,7 +232,7 @@ def with_hood(
     if len(chains) != 1 or chains[0].closed or not _ends_in_front(pattern, chains[0]):
         raise InputError("a hood begins and ends at the centre front, and this neckline does not")
     chain, strip = chains[0], collar.strip
-    halves, crowns = dict[str, list[Edge]](), dict[str, list[Edge]]()
+    hood, middle, made = free_piece_name(pattern, "hood"), free_piece_name(pattern, "hood_strip"), list[Piece]()
     for size in pattern.pieces:
         neck = 0.5 * (chain_length(pattern, chain, size) - strip)
         lower = swept(Strip(length=2.0 * neck, height=0.1, turn=_HOOD_TURN))[0]
@@ -253,22 +249,23 @@ def with_hood(
         crown = np.vstack([bezier(*controls[:4], count=25), bezier(*controls[3:], count=25)[1:]])
         allowance = chain_allowance(pattern, chain, size)
         hem = Edge(name="front edge", points=np.array([lower[-1], controls[0]]), kind="hem", allowance=_HOOD_HEM)
-        halves[size] = [
+        edges = [
             Edge(name="neck", points=lower, allowance=allowance),
             hem,
             Edge(name="crown", points=crown, allowance=allowance),
         ]
+        made.append(_piece(pattern, hood, size, edges, paired=True, role="hood"))
         if strip:
             names = {"lower": "neck", "right end": "right side", "upper": "front edge", "left end": "left side"}
-            crowns[size] = [
+            edges = [
                 replace(hem, points=edge.points) if edge.name == "upper" else replace(edge, name=names[edge.name])
                 for edge in strip_edges(*swept(Strip(length=strip, height=drawn_length(crown))), allowance=allowance)
             ]
-    pattern, hood = _added(pattern, "hood", halves, quantity=2, paired=True, role="hood")
+            made.append(_piece(pattern, middle, size, edges, quantity=1, role="hood"))
+    pattern = with_pieces(pattern, made)
     one, other = SeamSide(piece=hood, edge="neck"), SeamSide(piece=hood, edge="neck", reversed=True, mirrored=True)
     if not strip:
         return sewn(copies_sewn(pattern, "hood crown", hood, "crown"), "hood", (other, one), chain.sides)
-    pattern, middle = _added(pattern, "hood_strip", crowns, quantity=1, role="hood")
     for mirrored, edge in ((False, "right side"), (True, "left side")):
         # The crown runs down to the neck, as the strip's left side does.
         crown_side = SeamSide(piece=hood, edge="crown", mirrored=mirrored, reversed=True)
@@ -320,31 +317,25 @@ def _rests_on(pattern: Pattern, chain: FreeChain, size: str, below: float) -> tu
     return polyline_length(back), float(offset.length)
 
 
-def _added(
+def _piece(
     pattern: Pattern,
     name: str,
-    edges: Mapping[str, Sequence[Edge]],
+    size: str,
+    edges: Sequence[Edge],
     *,
-    quantity: int,
+    quantity: int = 2,
     paired: bool = False,
     role: str = "collar",
-    lines: Mapping[str, Mapping[str, FloatArray]] = MappingProxyType({}),
-    marks: Mapping[str, Mapping[str, FloatArray]] = MappingProxyType({}),
-) -> tuple[Pattern, str]:
-    """Return a pattern with one more piece, and what it is called; its grain runs upwards through the middle."""
-    name = free_piece_name(pattern, name)
-
-    def draw(size: str) -> Piece:
-        outline = np.concatenate([edge.points for edge in edges[size]])
-        (x, low), (right, high) = outline.min(axis=0), outline.max(axis=0)
-        return Piece(
-            name=name, size=size, fabric=pattern.pieces[size][0].fabric, quantity=quantity, edges=edges[size], paired=paired,
-            role=role, internal_lines=lines.get(size, {}), marks=marks.get(size, {}),
-            grain=np.array([[0.5 * (x + right), share * high + (1.0 - share) * low] for share in (0.3, 0.7)]),
-        )  # fmt: skip
-
+) -> Piece:
+    """Return a new piece; its grain runs upwards through the middle."""
+    outline = np.concatenate([edge.points for edge in edges])
+    (x, low), (right, high) = outline.min(axis=0), outline.max(axis=0)
+    grain = np.array([[0.5 * (x + right), share * high + (1.0 - share) * low] for share in (0.3, 0.7)])
     try:
-        return with_pieces(pattern, [draw(size) for size in pattern.pieces]), name
+        return Piece(
+            name=name, size=size, fabric=pattern.pieces[size][0].fabric, quantity=quantity, edges=edges, paired=paired, role=role,
+            grain=grain,
+        )  # fmt: skip
     except InputError:
         raise InputError(f"no {_words(name)} of these measures can be drawn along this neckline") from None
 

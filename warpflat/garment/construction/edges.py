@@ -17,6 +17,8 @@ from warpflat.core import FloatArray, find_unused_name, part_between
 from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
 
 __all__ = [
+    "ON",
+    "ON_EDGE",
     "Place",
     "backwards",
     "beside",
@@ -45,8 +47,10 @@ __all__ = [
 Place = tuple[str, str]
 Sides = SeamSide | tuple[SeamSide, ...]
 
-# What lies on an outline lies inside it, within this distance [m]; a line that is shorter inside than the second is left out.
-_ON, _SHORT = 1e-6, 1e-3
+#: What lies on a line or an outline does so within this distance [m]; a line of a piece ends on an edge within the second.
+ON, ON_EDGE = 1e-6, 1e-3
+# A line that is shorter inside an outline is left out [m].
+_SHORT = 1e-3
 
 
 def direction(points: FloatArray) -> FloatArray:
@@ -72,7 +76,7 @@ def lines_inside(lines: Mapping[str, FloatArray], outline: FloatArray) -> dict[s
     """Return of each line the longest part that lies inside an outline; lines with less than 1 mm inside are left out."""
     import shapely
 
-    body, found = shapely.Polygon(outline).buffer(_ON), {}
+    body, found = shapely.Polygon(outline).buffer(ON), {}
     for name, line in lines.items():
         parts = shapely.get_parts(shapely.LineString(line).intersection(body))
         parts = [part for part in parts if part.geom_type == "LineString" and part.length > _SHORT]
@@ -149,7 +153,7 @@ def trimmed(piece: Piece, edges: Sequence[Edge], **other: Any) -> Piece:
     import shapely
 
     outline = np.concatenate([edge.points[:-1] for edge in edges])
-    body = shapely.Polygon(outline).buffer(_ON)
+    body = shapely.Polygon(outline).buffer(ON)
     return replace(
         piece, edges=edges, internal_lines=lines_inside(piece.internal_lines, outline),
         marks={name: mark for name, mark in piece.marks.items() if body.contains(shapely.Point(mark))}, **other,

@@ -6,7 +6,7 @@ cloth is folded.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -34,10 +34,10 @@ from warpflat.garment.construction.edges import (
     with_edges,
     with_pieces,
 )
-from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
+from warpflat.pattern import Edge, Pattern, Piece, SeamSide
 
 __all__ = [
-    "INNER", "STAND", "STAND_END", "Stand", "centre_notch", "is_beside", "opened_in", "strip_along", "strip_piece", "with_facings",
+    "INNER", "STAND", "STAND_END", "Stand", "centre_notch", "is_beside", "sewn_alike", "strip_along", "strip_piece", "with_facings",
     "with_stand_facings",
 ]  # fmt: skip
 
@@ -63,10 +63,6 @@ class Stand:
     width: float
 
 
-#: By piece and edge, the piece and edge that the facing has for it, and whether that runs the other way.
-_Parts = dict[Place, tuple[str, str, bool]]
-
-
 def with_facings(
     pattern: Pattern,
     places: Sequence[Place],
@@ -89,8 +85,7 @@ def with_facings(
     Raises:
         InputError: a dart ends in an edge, or the facing would not lie within the piece.
     """
-    parts: _Parts = {}
-    shell = pattern
+    parts, shell = dict[Place, SeamSide](), pattern
     for name, edge in places:
         title = free_piece_name(pattern, f"{name}_{edge}_facing".replace(" ", "_"))
         stand = next((each for each in stands if is_beside(shell, each, (name, edge))), None)
@@ -100,23 +95,44 @@ def with_facings(
         grown_on = stand is not None and stand.grown_on
         pattern = _faced(pattern, name, chain, width, title, stand)
         for each in (edge, *beside(sample, *chain)):
-            parts[name, each] = (name, f"facing {each}", True) if grown_on else (title, each, False)
+            on_facing = SeamSide(piece=title, edge=each)
+            parts[name, each] = SeamSide(piece=name, edge=f"facing {each}", reversed=True) if grown_on else on_facing
         side = SeamSide(piece=name, edge=edge)
-        words = title.replace("_", " ")
-        pattern = sewn(pattern, words, side, _part(side, parts), notches=centre_notch(sample))
+        pattern = sewn(pattern, title.replace("_", " "), side, parts[name, edge], notches=centre_notch(sample))
         if stand is not None and not grown_on:
             side = replace(side, edge=stand.edge)
             words = f"{name} {stand.edge} facing".replace("_", " ")
             pattern = sewn(pattern, words, side, replace(side, piece=title))
-    # Facings are sewn to each other where their pieces are.
+    return sewn_alike(pattern, shell, parts, gaps, f"{places[0][1]} facing")
+
+
+def sewn_alike(
+    pattern: Pattern, shell: Pattern, parts: Mapping[Place, SeamSide], gaps: Collection[str], of: str
+) -> Pattern:
+    """Return a pattern whose strips are sewn to each other where their pieces are.
+
+    Args:
+        pattern: with the strips.
+        shell: the pattern without them.
+        parts: by edge of the shell what lies along it, reversed if that runs the other way.
+        gaps: names of seams that an opening leaves open there.
+        of: what the strips are called.
+    """
     for seam in shell.seams:
         both = [row[0] for row in seam.sides]
-        centre = both[0].piece == both[1].piece
-        if not opened_in(shell, seam, gaps, centre=centre) and all(
-            len(row) == 1 and (row[0].piece, row[0].edge) in parts for row in seam.sides
-        ):
-            words = f"{seam.name} of {places[0][1]} facing"
-            pattern = sewn(pattern, words, _part(both[0], parts), _part(both[1], parts))
+        # Of halves on the fold one seam is listed for both sides, and just one of them has the opening.
+        centre, on_fold = (
+            both[0].piece == both[1].piece,
+            any(shell.piece(side.piece, shell.sample).on_fold for side in both),
+        )
+        is_open = seam.name in gaps and (centre or not on_fold)
+        if not is_open and all(len(row) == 1 and (row[0].piece, row[0].edge) in parts for row in seam.sides):
+            along = [(side, parts[side.piece, side.edge]) for side in both]
+            sides = [
+                replace(side, piece=part.piece, edge=part.edge, reversed=side.reversed != part.reversed)
+                for side, part in along
+            ]
+            pattern = sewn(pattern, f"{seam.name} of {of}", sides[0], sides[1])
     return pattern
 
 
@@ -156,15 +172,6 @@ def _faced(
     return with_pieces(pattern, made)
 
 
-def opened_in(pattern: Pattern, seam: Seam, gaps: Collection[str], *, centre: bool = False) -> bool:
-    """Return whether a seam is left open at its upper end on both sides of the body, or in the centre.
-
-    Of halves on the fold one seam is listed for both sides, and just one of them has the opening.
-    """
-    on_fold = any(pattern.piece(row[0].piece, pattern.sample).on_fold for row in seam.sides)
-    return seam.name in gaps and (centre or not on_fold)
-
-
 def centre_notch(piece: Piece) -> tuple[float, ...] | None:
     """Return the notch in the middle of an edge that crosses the centre line; None where the piece has one side only.
 
@@ -177,12 +184,6 @@ def centre_notch(piece: Piece) -> tuple[float, ...] | None:
 def is_beside(pattern: Pattern, stand: Stand, place: Place) -> bool:
     """Return whether a button stand lies beside an edge of its piece, at one of its ends."""
     return stand.piece == place[0] and stand.edge in beside(pattern.piece(stand.piece, pattern.sample), place[1])
-
-
-def _part(side: SeamSide, parts: _Parts) -> SeamSide:
-    """Return the side of a seam on the facing for one on its piece."""
-    piece, edge, flipped = parts[side.piece, side.edge]
-    return replace(side, piece=piece, edge=edge, reversed=side.reversed != flipped)
 
 
 def strip_along(piece: Piece, chain: Sequence[str], width: float, *, around: FloatArray | None = None) -> list[Edge]:

@@ -25,7 +25,7 @@ from warpflat.garment.construction.flounces import with_flounce
 from warpflat.garment.construction.free_edges import Break, FreeChain, chain_allowance, chain_length, free_chains
 from warpflat.garment.construction.plackets import with_placket, with_slits
 from warpflat.garment.construction.shaped_band import shortened, slant_rises, with_shaped_waistband
-from warpflat.garment.construction.strips import CLOTH_WIDTH, Strip, panel_count, strip_edges, swept
+from warpflat.garment.construction.strips import CLOTH_WIDTH, NARROW, Strip, panel_count, strip_edges, swept
 from warpflat.pattern import Edge, Elastic, Pattern, Piece, SeamSide
 
 __all__ = ["FINISHES", "Finishing", "finish_edges", "hem_rises", "with_plackets"]
@@ -54,8 +54,6 @@ _STRIPS = {
     # A turtleneck, which is doubled and turned down.
     "collar": (True, (0.0, 1.0), "strip"),
 }
-# Allowance of the hem of a ruffle, and of the edge of a casing that is turned in [m].
-_NARROW = 0.010
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,7 +183,7 @@ def _with_finish(
         return with_collar(pattern, places, collar, gaps=gaps, breaks=breaks)
     if wish.kind == "casing":
         # Turned in, with an allowance of its width, and the edge turned in once more.
-        wide = wish.width + _NARROW
+        wide = wish.width + NARROW
         return _with_changed_edges(pattern, places, lambda piece, edge: replace(edge, kind="hem", allowance=wide))
     if wish.shaped:
         return with_shaped_waistband(pattern, places, wish.width, gaps=gaps)
@@ -347,7 +345,7 @@ def _strip(
     high, whole = wish.width * (2 if folded else 1), length + wish.overlap
     # What is turned in has an allowance too, and no seam; a binding's other edge is folded over as it is cut.
     ends = "seam" if joined else "cut"
-    upper = {"binding": ("cut", 0.0), "ruffle": ("hem", _NARROW)}.get(wish.kind, ("cut", allowance))
+    upper = {"binding": ("cut", 0.0), "ruffle": ("hem", NARROW)}.get(wish.kind, ("cut", allowance))
     edges = strip_edges(
         *swept(Strip(length=length, height=high)), overlap=wish.overlap,
         kinds={"overlap": "cut", "upper": upper[0], "right end": ends, "left end": ends},

@@ -18,15 +18,13 @@ from warpflat.garment.construction.edges import (
 )
 from warpflat.garment.construction.facings import centre_notch
 from warpflat.garment.construction.free_edges import FreeChain, chain_allowance, chain_length
-from warpflat.garment.construction.strips import CLOTH_WIDTH, Strip, panel_count, strip_edges, swept
+from warpflat.garment.construction.strips import CLOTH_WIDTH, NARROW, Strip, panel_count, strip_edges, swept
 from warpflat.pattern import Edge, Pattern, Piece, SeamSide
 
 __all__ = ["with_flounce"]
 
 # A panel turns by no more [rad]: beyond that its sides would meet.
 _MOST_TURN = np.radians(330.0)
-# Allowance of its hem [m]: a curved hem cannot be turned up far.
-_HEM = 0.010
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,7 +138,8 @@ def _with_panel(
             kept = slice(0, middle + 1) if folded[0] else slice(middle, None)
             lower, upper = lower[kept], upper[kept]
         # Sewn with right sides together, its edge runs against those of the piece: what follows there comes first here.
-        named = {"lower": (called, "seam", allowances[size]), "upper": ("hem", "hem", _HEM)}
+        # A curved hem cannot be turned up far.
+        named = {"lower": (called, "seam", allowances[size]), "upper": ("hem", "hem", NARROW)}
         for key, end, on_fold in zip(("right end", "left end"), ends, folded, strict=True):
             named[key] = (end, "fold", 0.0) if on_fold else (end, "seam", allowances[size])
         # It hangs down.

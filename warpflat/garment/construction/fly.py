@@ -9,6 +9,7 @@ import numpy as np
 
 from warpflat.core import InputError, part_between
 from warpflat.garment.construction.edges import (
+    ON,
     downwards,
     free_piece_name,
     in_sizes,
@@ -22,8 +23,6 @@ __all__ = ["with_flies"]
 
 # Width of the facing and, where the waistband has no underlap, of the finished shield; how far both reach below the zip [m].
 _WIDE, _BELOW = 0.040, 0.020
-# What lies this near to a line lies on it [m].
-_ON = 1e-6
 
 
 def with_flies(pattern: Pattern) -> Pattern:
@@ -75,7 +74,7 @@ def _with_fly(pattern: Pattern, seam: Seam, length: float, band: str) -> Pattern
         if region.geom_type != "Polygon" or length > centre.length:
             raise InputError(f"a fly of {1e3 * length:.0f} mm finds no room along {side.piece}.{side.edge}")
         ring = np.asarray(shapely.orient_polygons(region).exterior.coords)[:-1]
-        on = [shapely.distance(line, shapely.points(ring)) < _ON for line in (waist, centre)]
+        on = [shapely.distance(line, shapely.points(ring)) < ON for line in (waist, centre)]
         kinds = np.where(on[0] & np.roll(on[0], -1), 0, np.where(on[1] & np.roll(on[1], -1), 1, 2))
         first = next(k for k in range(len(ring)) if kinds[k] != kinds[k - 1])
         kinds, ring = np.roll(kinds, -first), np.roll(ring, -first, axis=0)

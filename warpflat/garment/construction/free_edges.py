@@ -9,6 +9,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, find_unused_name, other_side, points_at_lengths, polyline_length, without_side
 from warpflat.garment.construction.edges import (
+    ON_EDGE,
     Place,
     direction,
     in_sizes,
@@ -41,8 +42,6 @@ Break = tuple[str, str, int]
 
 # Chains of both sides of the body whose lengths differ by no more [m] get one piece, cut twice.
 _ALIKE = 5e-4
-# A line ends on an edge within this distance [m].
-_ON_EDGE = 1e-3
 #: A line meets an edge inside it, not at its ends, beyond this distance [m].
 OFF_END = 2e-3
 # Directions at the ends of edges are those of their first or last so much [m].
@@ -229,7 +228,7 @@ def marks_of(pattern: Pattern, chain: FreeChain, size: str, line: str) -> list[f
         lines = [each for name, each in known.items() if name.rstrip(" 0123456789") == line]
         for end in (shapely.Point(each[k]) for each in lines for k in (0, -1)):
             at = before + float(drawn.project(end))
-            if drawn.distance(end) < _ON_EDGE and all(abs(at - other) > OFF_END for other in found):
+            if drawn.distance(end) < ON_EDGE and all(abs(at - other) > OFF_END for other in found):
                 found.append(at)
         before += polyline_length(points)
     return sorted(found)

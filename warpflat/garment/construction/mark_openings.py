@@ -10,6 +10,7 @@ import numpy as np
 from warpflat.core import FloatArray, InputError, find_unused_name, part_between, polyline_length
 from warpflat.garment.construction.button_stand import bust_depth, button_depths, with_button_stand, with_wrap
 from warpflat.garment.construction.edges import (
+    ON,
     direction,
     downwards,
     in_sizes,
@@ -268,7 +269,7 @@ def _keyhole(piece: Piece, opening: Opening) -> Piece:
     shapes = {"keyhole": slit[[0, -1]], "keyhole end": ring}
     for number, (sign, end) in enumerate(((-1.0, ring[0]), (1.0, ring[-1]))):
         shapes[f"keyhole side {number + 1}"] = np.array([slit[0] + sign * half * across, end])
-    body = shapely.Polygon(piece.outline).buffer(1e-6)
+    body = shapely.Polygon(piece.outline).buffer(ON)
     lines = {**piece.internal_lines, **lines_inside(shapes, piece.outline)}
     button = slit[0] + 0.010 * along + (half + 0.008) * across
     marks = {**piece.marks, "button": button} if body.contains(shapely.Point(button)) else dict(piece.marks)

@@ -10,6 +10,8 @@ import numpy as np
 from warpflat.core import FloatArray, InputError, arc_lengths, find_unused_name, points_at_lengths
 from warpflat.garment.construction.button_stand import buttonhole
 from warpflat.garment.construction.edges import (
+    ON,
+    ON_EDGE,
     Place,
     direction,
     free_piece_name,
@@ -65,7 +67,7 @@ def with_slits(pattern: Pattern, places: Sequence[Place], length: float, called:
                 direction(points_at_lengths(points, [at[size] - 1e-3, at[size] + 1e-3])),
             )
             lines[size] = np.array([start, start + length * np.array([-y, x])])
-            if not shapely.Polygon(piece.outline).buffer(1e-6).contains(shapely.LineString(lines[size])):
+            if not shapely.Polygon(piece.outline).buffer(ON).contains(shapely.LineString(lines[size])):
                 raise InputError(f"a slit of {1e3 * length:.0f} mm from {name}.{edge} does not lie within the piece")
         pattern, broken = split_edge(pattern, (name, edge), at)
         breaks.append(broken)
@@ -117,7 +119,7 @@ def with_placket(pattern: Pattern, places: Sequence[Place], length: float, calle
         chain = free_chain(pattern, [place])
         at = {size: marks_of(pattern, chain, size, "centre front") for size in pattern.pieces}
         lengths = {size: pattern.piece(name, size).edge(edge).length for size in pattern.pieces}
-        if all(len(row) == 1 and 1e-3 < row[0] < lengths[size] - 1e-3 for size, row in at.items()):
+        if all(len(row) == 1 and ON_EDGE < row[0] < lengths[size] - ON_EDGE for size, row in at.items()):
             break
     else:
         raise InputError("a placket lies in the centre front, and no piece of this edge crosses it")
@@ -135,7 +137,7 @@ def with_placket(pattern: Pattern, places: Sequence[Place], length: float, calle
         body = shapely.Polygon(piece.outline)
         if not body.buffer(0.02).contains(shapely.MultiLineString(list(lines.values()))):
             raise InputError(f"a placket of {1e3 * length:.0f} mm does not lie within {name!r}")
-        inside = {title: shapely.LineString(line).intersection(body.buffer(1e-6)) for title, line in lines.items()}
+        inside = {title: shapely.LineString(line).intersection(body.buffer(ON)) for title, line in lines.items()}
         return _with_lines(piece, {title: np.asarray(line.coords) for title, line in inside.items()})
 
     marks, holes = dict[str, FloatArray](), dict[str, FloatArray]()

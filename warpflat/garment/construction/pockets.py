@@ -35,15 +35,13 @@ from warpflat.garment.construction.edges import (
     with_pieces,
 )
 from warpflat.garment.construction.mark_openings import with_notches
-from warpflat.garment.construction.strips import Strip, folded_strip, strip_edges, swept
+from warpflat.garment.construction.strips import NARROW, Strip, folded_strip, strip_edges, swept
 from warpflat.pattern import Edge, Pattern, Piece, SeamSide
 
 __all__ = ["Pocket", "add_pockets"]
 
 # Hem of a patch pocket, and how much lower its middle lies than its lower corners [m].
 _HEM, _POINT = 0.030, 0.015
-# Allowance of edges that are turned in or overlocked, not sewn [m].
-_ALLOWANCE = 0.010
 # A bag runs past both ends of its opening [m].
 _PAST = 0.020
 # An opening ends this far above the lower end of its seam [m].
@@ -132,16 +130,16 @@ def _with_placed(pattern: Pattern, pocket: Pocket) -> Pattern:
         here, count = fitted[like.size], counts[like.size]
         if pocket.kind == "patch":
             names = ("upper", "left side", "lower left", "lower right", "right side")
-            edges = polygon_edges(names, _shape(here), kind="cut", allowance=_ALLOWANCE)
+            edges = polygon_edges(names, _shape(here), kind="cut", allowance=NARROW)
             edges = [replace(edges[0], kind="hem", allowance=_HEM), *edges[1:]]
             made.append(_pocket_piece(patch, like, edges, count))
         else:
             long = here.width + 2 * _WELT_ENDS
             bag_edges = strip_edges(
-                *swept(Strip(length=here.width + 2 * _BESIDE, height=here.height)), kinds="cut", allowance=_ALLOWANCE
+                *swept(Strip(length=here.width + 2 * _BESIDE, height=here.height)), kinds="cut", allowance=NARROW
             )
             made += [
-                folded_strip(welt, like, long, here.welt, role="pocket", quantity=count, allowance=_ALLOWANCE),
+                folded_strip(welt, like, long, here.welt, role="pocket", quantity=count),
                 _pocket_piece(bag, like, bag_edges, 2 * count),
             ]
     return with_pieces(pattern, made)
@@ -323,7 +321,7 @@ def _hip_pocket(
         return replace(piece.edge(name), points=joined[:: -1 if name == upper else 1], vertices=None)
 
     def under(name: str) -> Edge:
-        return replace(part(name, parts[name][1]), name=f"{name} under", kind="cut", allowance=_ALLOWANCE)
+        return replace(part(name, parts[name][1]), name=f"{name} under", kind="cut", allowance=NARROW)
 
     # From the corner along the side, around and back along the upper edge.
     around = [under(side), Edge(name="rim", points=rim), under(upper)]
@@ -405,7 +403,7 @@ def _with_bags(pattern: Pattern, pocket: Pocket) -> Pattern:
         past = pocket.below - start
         marked = {"pocket opening": length - past, "pocket opening end": length - past - pocket.height}
         edges = [
-            Edge(name="opening", points=np.array([[0.0, 0.0], [0.0, length]]), kind="cut", allowance=_ALLOWANCE),
+            Edge(name="opening", points=np.array([[0.0, 0.0], [0.0, length]]), kind="cut", allowance=NARROW),
             Edge(name="rim", points=around),
         ]
         return _pocket_piece(

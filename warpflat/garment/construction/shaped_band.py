@@ -18,6 +18,7 @@ from warpflat.core import (
     polyline_length,
 )
 from warpflat.garment.construction.edges import (
+    ON_EDGE,
     Place,
     beside,
     direction,
@@ -28,12 +29,12 @@ from warpflat.garment.construction.edges import (
     up_and_across,
     with_pieces,
 )
-from warpflat.garment.construction.facings import INNER, centre_notch, opened_in, strip_along, strip_piece
+from warpflat.garment.construction.facings import INNER, centre_notch, sewn_alike, strip_along, strip_piece
 from warpflat.garment.construction.free_edges import free_chains
 from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
 
-# A line ends on an edge within this distance [m].
-_ON_EDGE = 1e-3
+# So much is left of an edge beside a strip at least [m].
+_LEAST_LEFT = 0.005
 # A slanted edge has so many points at least, and is moved by so much [m] where it stays: a strip has two ends.
 _SLANTED, _LEAST_RISE = 33, 2e-5
 
@@ -64,7 +65,7 @@ def without_strip(piece: Piece, strip: Sequence[Edge], inner: str) -> Piece:
         while len(beside) > 1 and beside[0].length <= end + 1e-9:
             end -= beside.pop(0).length
         edge, points = beside[0], beside[0].points[::turn]
-        if edge.length - end < 0.005:
+        if edge.length - end < _LEAST_LEFT:
             raise InputError(
                 f"{piece.name}: strips meet at {edge.name!r}; make them narrower, or bind one of the edges"
             )
@@ -97,7 +98,7 @@ def with_shaped_waistband(
     Raises:
         InputError: a dart ends in an edge, or the band is too wide.
     """
-    shell, kept = pattern, list(pattern.seams)
+    shell, parts = pattern, dict[Place, SeamSide]()
     # By edge beside the waist the band that takes its upper end, and whether the edge begins there.
     cut = dict[Place, tuple[str, bool]]()
     for name, edge in places:
@@ -118,18 +119,12 @@ def with_shaped_waistband(
         pattern = with_pieces(pattern, made)
         before, after = beside(whole, edge)
         cut |= {(name, before): (title, False), (name, after): (title, True)}
+        parts |= {(name, each): SeamSide(piece=title, edge=each) for each in (before, after)}
         upper, lower = SeamSide(piece=title, edge=INNER, reversed=True), SeamSide(piece=name, edge=f"{edge} seam")
         pattern = sewn(pattern, title.replace("_", " "), lower, upper, notches=centre_notch(whole))
-    for seam in shell.seams:
-        both = [row[0] for row in seam.sides]
-        if opened_in(shell, seam, gaps) or any(
-            len(row) > 1 or (row[0].piece, row[0].edge) not in cut for row in seam.sides
-        ):
-            continue
-        sides = [replace(side, piece=cut[side.piece, side.edge][0]) for side in both]
-        pattern = sewn(pattern, f"{seam.name} of the waistband", *sides)
-    moved = [_with_moved_notches(shell, seam, cut, dict.fromkeys(cut, width)) for seam in kept]
-    return replace(pattern, seams=[*moved, *pattern.seams[len(kept) :]])
+    pattern = sewn_alike(pattern, shell, parts, gaps, "the waistband")
+    moved = [_with_moved_notches(shell, seam, cut, dict.fromkeys(cut, width)) for seam in shell.seams]
+    return replace(pattern, seams=[*moved, *pattern.seams[len(moved) :]])
 
 
 def shortened(pattern: Pattern, places: Sequence[Place], width: float | Mapping[str, float]) -> Pattern:
@@ -189,7 +184,7 @@ def slant_rises(
                 (key, float(line.project(shapely.Point(point))))
                 for key, points in piece.internal_lines.items()
                 for point in points[[0, -1]]
-                if line.distance(shapely.Point(point)) < _ON_EDGE
+                if line.distance(shapely.Point(point)) < ON_EDGE
             ]
             for key, place in crossed:
                 key = other_side(key) if side.mirrored else key
@@ -205,7 +200,7 @@ def slant_rises(
         if chain.closed:
             knots = {place + turn * start: rise for turn in (-1, 0, 1) for place, rise in knots.items()}
         at = np.array(sorted(knots))
-        at = at[np.diff(at, prepend=-np.inf) > _ON_EDGE]
+        at = at[np.diff(at, prepend=-np.inf) > ON_EDGE]
         values = np.array([knots[place] for place in at.tolist()])
         for side, begin in zip(chain.sides, starts, strict=True):
             points = pattern.piece(side.piece, size).edge(side.edge).points
@@ -213,7 +208,7 @@ def slant_rises(
             arc = np.unique(np.concatenate([arc, np.linspace(0.0, arc[-1], _SLANTED)]))
             along = np.clip(begin + (arc[-1] - arc if side.reversed else arc), at[0], at[-1])
             wide = PchipInterpolator(at, values)(along) if len(at) > 1 else np.full(len(arc), values[0])
-            if np.abs(found.setdefault((side.piece, side.edge), (arc, wide))[1] - wide).max() > _ON_EDGE:
+            if np.abs(found.setdefault((side.piece, side.edge), (arc, wide))[1] - wide).max() > ON_EDGE:
                 raise InputError(
                     f"{side.piece} is cut on the fold or twice, and cannot be shorter on one side; with half = false it is cut whole"
                 )
@@ -232,7 +227,7 @@ def _slanted_strip(piece: Piece, name: str, rise: tuple[FloatArray, FloatArray])
     arc, wide = rise
     wide = np.maximum(wide, _LEAST_RISE)
     ends = list(zip((before.points[::-1], after.points), wide[[0, -1]].tolist(), strict=True))
-    if any(polyline_length(line) < height + 0.005 for line, height in ends):
+    if any(polyline_length(line) < height + _LEAST_LEFT for line, height in ends):
         raise InputError(f"the edges beside {piece.name}.{name} are shorter than {1e3 * wide.max():.0f} mm")
     # Away from the edge's ends along the edges beside it, and between them in a direction between those.
     parts = [part_between(line, 0.0, height) for line, height in ends]
