@@ -324,7 +324,7 @@ def _hip_pocket(
         return replace(part(name, parts[name][1]), name=f"{name} under", kind="cut", allowance=NARROW)
 
     # From the corner along the side, around and back along the upper edge.
-    around = [under(side), Edge(name="rim", points=rim), under(upper)]
+    around = [under(side), Edge(name="rim", points=rim, as_drawn=True), under(upper)]
     of_facing = [part(upper, parts[upper][0]), part(side, parts[side][0]), *around]
     of_bag = [straight, *around]
     # The opening stands before or behind the side's edge.
