@@ -1,15 +1,19 @@
-"""Girths: what a tape reads around the body, around the form, and along the pattern with its darts and seams closed."""
+"""Girths: what a tape reads around the body, around the form, and along the pattern with its darts and seams closed.
+
+Around trunk, arms and legs tapes are level; at the neck and around an armhole they follow the line.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, IntArray, without_side
+from warpflat.core import FloatArray, IntArray, segment_lengths, without_side
 from warpflat.garment.construction.constraints import KeptGirth
-from warpflat.garment.construction.tapes import PieceEdges, stretch_tape
+from warpflat.garment.construction.tapes import ALONG, PieceEdges, stretch_tape
 from warpflat.garment.construction.wearer import body_rows
 from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS, RING_LEVELS
 from warpflat.garment.mannequin.profiles import convex_girth
@@ -57,7 +61,7 @@ def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping
 def pattern_girths(
     mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]
 ) -> dict[str, dict[str, float]]:
-    """Return the entry `girths` of `metrics.json` for every closed level of trunk, arms and legs that the pieces go around.
+    """Return the entry `girths` of `metrics.json`: levels of trunk, arms and legs, neck and armholes that the pieces go around.
 
     The pattern's girth is the length of the level's line in the pieces: a dart on the way adds nothing, nor does a seam. Where
     two pieces meet along the level it is the mean of both. A half piece counts twice. Where the line slopes on the form, as at
@@ -86,6 +90,22 @@ def pattern_girths(
         }
         if level in form.ease:
             found[level]["ease_wanted_m"] = 0.01 * form.ease[level]
+    # A sleeve's cap, which is eased or gathered into its armhole, is longer than that.
+    caps = {
+        name
+        for name, piece in form.pieces.items()
+        if any(np.isin(piece.grid_vertices, arm[1:]).any() for arm in layout.arms.values())
+    }
+    trunk = PieceEdges(layout, replace(form, pieces={n: piece for n, piece in form.pieces.items() if n not in caps}))
+    lines = {"neck": layout.lines["neck"][:-1], **{f"armhole {side}": arm[0] for side, arm in layout.arms.items()}}
+    for name, row in lines.items():
+        edges = trunk.along(row, ALONG)
+        if edges is not None:
+            pattern = float(edges.lengths(positions, len(row)).sum())
+            body, designed = (
+                float(segment_lengths(points[row], closed=True).sum()) for points in (mannequin.vertices, form.vertices)
+            )
+            found[name] = {"body_m": body, "form_m": designed, "pattern_m": pattern, "ease_m": pattern - body}
     # Of limbs what the recipe asks for, but between ruled levels, where cloth hangs.
     limbs, asked = [*ARM_LEVELS, *LEG_LEVELS], form.recipe.ease
     spans = [sorted(map(limbs.index, pair)) for pair in form.recipe.ruled if set(pair) <= set(limbs)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -36,7 +36,10 @@ class MirrorPair:
 
 
 def find_mirror_pairs(
-    garments: Mapping[str, Garment], pieces: Mapping[str, Sequence[Piece]], seams: Sequence[Seam]
+    garments: Mapping[str, Garment],
+    pieces: Mapping[str, Sequence[Piece]],
+    seams: Sequence[Seam],
+    unlike: Collection[str] = (),
 ) -> tuple[MirrorPair, ...]:
     """Find pieces that are mirror images in every size, with equal edges, and whose seams are mirror images too.
 
@@ -44,11 +47,12 @@ def find_mirror_pairs(
         garments: flattened, by size.
         pieces: their patterns, all of them.
         seams: between these.
+        unlike: pieces that are going to be cut unlike their mirror images.
     """
     every = [set(garment.pairs) for garment in garments.values()]
     found: list[MirrorPair] = []
     for first, second in next(iter(garments.values())).pairs:
-        if not all((first, second) in pairs for pairs in every):
+        if first in unlike or second in unlike or not all((first, second) in pairs for pairs in every):
             continue
         matched = [_matching_edges(garments[size], pieces[size], first, second) for size in garments]
         if matched[0] is not None and all(edges == matched[0] for edges in matched):

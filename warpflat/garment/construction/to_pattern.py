@@ -237,19 +237,28 @@ def pattern_of_garment(
     ):
         side = (SeamSide(piece=piece, edge=edge),)
         seams = (*seams, Seam(name=find_unused_name(title, {seam.name for seam in seams}), sides=(side, side)))
-    # One pattern cannot serve for both sides where just one of them has an opening, or a hem slants to one side.
-    apart = one_sided(sample.openings) or any(wish.is_one_sided for wish in sample.finishing)
-    pairs = () if apart else find_mirror_pairs(garments, pieces, seams)
+    placed = {
+        size: [place_opening(forms[size], opening, garment.positions) for opening in garment.openings]
+        for size, garment in garments.items()
+    }
+    # One pattern cannot serve for both sides where an opening is cut into just one of them, or a hem slants to one side.
+    cut = one_sided(sample.openings)
+    parted = {
+        part.seam
+        for opening, parts in zip(sample.openings, placed[next(iter(garments))], strict=True)
+        for part in parts
+        if opening in cut
+    }
+    unlike = {side.piece for seam in seams if seam.name in parted for row in seam.sides for side in row}
+    slanted = {wish.edge for wish in sample.finishing if wish.is_one_sided}
+    unlike |= {piece.name for piece in pieces[next(iter(pieces))] for edge in piece.edges if edge.name in slanted}
+    pairs = find_mirror_pairs(garments, pieces, seams, unlike)
     drawn, notes = _drawn_once(pieces, pairs)
     notes += tuple(
         f"{piece}: {opened[piece]} bends by {stray * 1000:.1f} mm and cannot lie on the fold: cut twice, with a seam there"
         for piece, stray in bent.items()
     )
     pattern = Pattern(name=name, pieces=drawn, seams=sew_mirror_pairs(seams, pairs), sample_size=sample_size)
-    placed = {
-        size: [place_opening(forms[size], opening, garment.positions) for opening in garment.openings]
-        for size, garment in garments.items()
-    }
     pattern = mark_openings(pattern, sample.openings, placed)
     zips = [
         row[0].seam for row, each in zip(placed[pattern.sample], sample.openings, strict=True) if each.opens_the_top

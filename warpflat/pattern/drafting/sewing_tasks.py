@@ -128,21 +128,27 @@ class SewingTasks:
         self.order = {name: [edge.name for edge in piece.edges] for name, piece in self.pieces.items()}
         self.lengths = {report.name: report.length_mm for report in garment.seams if report.size == size}
         self.tasks = [Task(technique=self._technique(group), seams=group) for group in _mirror_groups(self.seams)]
-        # Of halves on the fold the seam of one side stands for both, and a zip lies in one of them.
-        for task in [task for task in self.tasks if task.seams[0].openings and self.stands_for_both(task.seams)]:
-            other = replace(task.seams[0], name=other_side(task.seams[0].name), openings=())
-            self.tasks.append(Task(technique=self._technique([other]), seams=[other], like=task))
+        # A zip lies in one of two sides. Of halves on the fold the seam of one side stands for both.
+        for task in [task for task in self.tasks if task.seams[0].openings]:
+            name = other_side(task.seams[0].name)
+            for other in self.tasks:
+                if other.seams[0].name == name != task.seams[0].name and not other.seams[0].openings:
+                    other.like = task
+            if self.stands_for_both(task.seams):
+                seam = replace(task.seams[0], name=name, openings=())
+                self.tasks.append(Task(technique=self._technique([seam]), seams=[seam], like=task))
         self._finish(garment)
 
     def stands_for_both(self, group: Sequence[Seam]) -> bool:
         """Return whether a seam of halves on the fold, or of pairs, is sewn on both sides of the body."""
         seam, other = group[0], other_side(group[0].name)
+        if len(group) > 1 or (other != seam.name and other in {each.name for each in self.seams}):
+            return False
         joined = [self.pieces[side.piece] for row in seam.sides for side in row]
         within = not any(side.mirrored or side.copy for row in seam.sides for side in row)
         if within and all(piece.quantity == 2 and not piece.on_fold for piece in joined):
-            return len(group) == 1
-        both = all(piece.on_fold or piece.is_pair for piece in joined)
-        return both and len(group) == 1 and other != seam.name and other not in {each.name for each in self.seams}
+            return True
+        return other != seam.name and all(piece.on_fold or piece.is_pair for piece in joined)
 
     def called(self, names: Iterable[str]) -> str:
         """Return pieces in words."""
