@@ -128,7 +128,12 @@ _CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|mar
     "straight where a slender ring is sewn along one side, as a neck band.  [default: auto]",
 )
 @click.option("--bands-shorter", type=float, metavar="SHARE", help="Cut straight bands shorter still, as rib is: 0.1.")
-@click.option("--model", metavar="NAME", help="springs, or membrane: the cloth measured as worn.  [default: springs]")
+@click.option(
+    "--model",
+    metavar="NAME",
+    help="auto: springs on quads along the grain, else membrane, cells in which the cloth is measured as worn; membrane: everywhere.  "
+    "[default: auto]",
+)
 @click.option("--stretch-warp", type=float, metavar="SHARE", help="Worn so much longer than flat along the warp: 0.1.")
 @click.option("--stretch-weft", type=float, metavar="SHARE", help="The same along the weft.")
 @click.option("--pressure", type=float, metavar="PA", help="On the skin; sets the stretch that runs around the body.")
