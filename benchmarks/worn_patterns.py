@@ -39,9 +39,7 @@ from wardrobe import WEARERS
 def wearer(given: Mapping[str, Any]) -> Mannequin:
     """Return the mannequin of a wearer of the wardrobe."""
     lengths = given.get("measurements", {})
-    return (
-        Mannequin.from_size(given["size"], **lengths) if "size" in given else Mannequin.from_measurements(**lengths)
-    )
+    return Mannequin.from_size(given["size"], **lengths) if "size" in given else Mannequin.from_measurements(**lengths)
 
 
 def row(file: Path, body: str, spacing: float, fabric: str, pictures: Path | None) -> str:
