@@ -160,6 +160,14 @@ def test_a_shirt_and_trousers_are_as_long_as_their_pieces_say():
     assert 0.3 < trousers["hem at the ankle"] < 0.45
 
 
+def test_a_leotard_has_no_inner_leg_and_pyjamas_no_waistband():
+    assert set(finished_lengths(drafted_garment("leotard", {}), "")) == {"side, below the armhole"}
+    leggings = finished_lengths(drafted_garment("leggings", {}), "")
+    # Without a side seam, from the band down.
+    assert 0.15 < leggings["outer leg, below the waistband"] - leggings["inner leg"] < 0.25
+    assert {"outer leg", "inner leg"} < set(finished_lengths(drafted_garment("pyjama_trousers", {}), ""))
+
+
 class Misses(dict[str, str]):
     """Words of a language, with those that were asked for in vain."""
 

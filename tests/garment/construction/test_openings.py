@@ -80,6 +80,16 @@ def test_a_zip_in_one_side_leaves_left_and_right_one_pattern(mannequin: Mannequi
     assert {p.quantity for p in slit.pieces[""]} == {1}
 
 
+def test_halves_that_rest_a_little_apart_are_drawn_once(skirt: Garment):
+    """A tenth of a millimetre over a side: what a relaxation's tolerance may leave, and more than sides of seams may differ by."""
+    half = skirt.pieces["back_left"]
+    longer = replace(half, positions=half.positions * [1.0, 1.0002])
+    pattern = pattern_of(replace(skirt, pieces={**skirt.pieces, "back_left": longer}), ZIP)
+    assert {p.name: p.quantity for p in pattern.pieces[""]} == {"front": 1, "back_left": 2}
+    edge = pattern.piece("back_left", "").edge("centre back").length
+    assert polyline_length(half.positions[skirt.form.pieces["back_left"].edges["centre back"]]) < edge
+
+
 def test_zip_that_ends_too_early_lets_nothing_pass(skirt: Garment):
     assert not passes(replace(skirt, openings=(replace(ZIP, length=0.05),)))["waist"]
 

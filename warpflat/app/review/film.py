@@ -29,7 +29,16 @@ from warpflat.core import (
     weighted_percentile,
 )
 from warpflat.flat import triangulate
-from warpflat.pattern import DRAFTED, VertexColours, energy_colours, face_areas, outline_edges, part_path
+from warpflat.pattern import (
+    DRAFTED,
+    DRAFTED_CLOTH,
+    SKIN,
+    VertexColours,
+    energy_colours,
+    face_areas,
+    outline_edges,
+    part_path,
+)
 
 __all__ = ["MAPS", "FilmPiece", "Shape", "open_film", "pack_film", "pack_foreign_film"]
 
@@ -43,8 +52,6 @@ _COLOURS = 256
 MAPS: Mapping[str, tuple[str, float, float]] = {"pressure": ("Pa", 1.0, 10.0), "gap": ("mm", 1e3, 5.0)}
 # A scale holds this share of the cloth; no value of a map is larger.
 _SHARE, _MOST_OF_MAP = 0.98, 1e9
-# Colours of the body and of drafted pieces on the page.
-_COLOURS_OF = {"body": (0.80, 0.77, 0.73), "drafted": (0.62, 0.64, 0.68)}
 # A body of more vertices than these is not shown.
 _MOST_OF_BODY = 100_000
 # Of zlib: the last level takes eight times as long as this one, and spares a twentieth of the bytes.
@@ -284,7 +291,7 @@ def _packed_still(stage: Any) -> list[dict[str, Any]]:
         found.append(
             {
                 "kind": kind,
-                "colour": _COLOURS_OF[kind],
+                "colour": SKIN if kind == "body" else DRAFTED_CLOTH,
                 "space": box.as_list(),
                 "vertices": len(points),
                 "triangles": len(triangles),

@@ -49,7 +49,7 @@ from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.form_plan import EdgePlan, check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.construction.line_drawing import describe_worn
 from warpflat.garment.construction.mark_openings import mark_openings
-from warpflat.garment.construction.mirror_pieces import MirrorPair, find_mirror_pairs, sew_mirror_pairs
+from warpflat.garment.construction.mirror_pieces import MirrorPair, evened, find_mirror_pairs, sew_mirror_pairs
 from warpflat.garment.construction.openings import one_sided, place_opening
 from warpflat.garment.construction.pockets import add_pockets
 from warpflat.garment.construction.strips import CLOTH_WIDTH
@@ -188,14 +188,14 @@ def pattern_of_garment(
     plans = {size: plan_form(each, rules) for size, each in forms.items()}
     plan = next(iter(plans.values()))
     # Relaxation keeps a piece upright, but not in its place: the lower ends of its datum lie on each other in all sizes.
-    laid = {}
+    laid, evened_sample = {}, evened(sample)
     for size, garment in garments.items():
-        moved = {}
-        for piece, flat in garment.pieces.items():
-            there = sample.pieces[piece]
+        moved, even = {}, evened(garment)
+        for piece, flat in even.pieces.items():
+            there = evened_sample.pieces[piece]
             offset = there.positions[there.datum[0]] - flat.positions[flat.datum[0]]
             moved[piece] = replace(flat, positions=np.round(flat.positions + offset, _DECIMALS))
-        laid[size] = replace(garment, pieces=moved)
+        laid[size] = replace(even, pieces=moved)
     garments, sample = laid, next(iter(laid.values()))
     # Half pieces whose fold strays from straight in some size, and by how much [m] at most.
     bent: dict[str, float] = {}
