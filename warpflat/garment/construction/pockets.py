@@ -282,13 +282,13 @@ def _cut_hip_pocket(pattern: Pattern, pocket: Pocket, front: SeamSide) -> Patter
             (upper, parts[upper][0][::-1], {"kind": own.kind, "allowance": own.allowance}),
             (front.edge, parts[front.edge][0], {"kind": side.kind, "allowance": side.allowance}),
             (f"{front.edge} under", parts[front.edge][1], under),
-            ("rim", rim[::-1], {}),
+            ("rim", rim[::-1], {"as_drawn": True}),
             (f"{upper} under", parts[upper][1][::-1], under),
         ]
         bag_rows: list[tuple[str, FloatArray, dict[str, Any]]] = [
             (opening, straight, {}),
             (f"{front.edge} under", parts[front.edge][1], under),
-            ("rim", rim[::-1], {}),
+            ("rim", rim[::-1], {"as_drawn": True}),
             (f"{upper} under", parts[upper][1][::-1], under),
         ]
         panel_rows = {
