@@ -61,8 +61,8 @@ PARTS = {
              "scene.frames:FrameRecorder.record_result"),
     "OBJ": ("export.obj:write_obj",),
     "picture.png": ("export.picture:write_picture",),
-    "wear.png": ("flattening.fit_picture:write_wear_picture", "flattening.fit_picture:write_wear_sheet"),
-    "walked.png": ("export.picture_walked:write_walked_picture",),
+    "wear.png": ("export.fit_picture:write_wear_sheet",),
+    "walked.png": ("export.walked_picture:write_walked_picture",),
     "pattern, drafting": (
         "garment.to_pattern:pattern_of_garment",
         "garment.to_pattern:pattern_of_surface",

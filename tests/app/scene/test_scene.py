@@ -4,26 +4,19 @@ import json
 import os
 import re
 import runpy
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from printed import faults
-from pypdf import PdfReader
-from usd_validation import validate_usd
 
 from warpflat.app.scene.frames import FrameSchedule
-from warpflat.app.scene.load import Scene, load_scene, scene_fabric
+from warpflat.app.scene.load import load_scene, scene_fabric
 from warpflat.app.scene.run import run_scene
 from warpflat.app.scene.schema import OutputTable
 from warpflat.app.scene.surface import scene_surface
 from warpflat.core.errors import InputError
-from warpflat.core.toml_file import read_toml
 from warpflat.flat.fabric.fabric import DEFAULT_FABRIC
 from warpflat.flat.fabric.library import find_fabric
-from warpflat.garment.construction.pattern_files import export_patterns
-from warpflat.pattern.export.pattern_json import read_pattern_json
 
 SCENES = Path(__file__).parents[3] / "scenes"
 DATA = os.environ.get("WARPFLAT_DATA")
@@ -287,96 +280,7 @@ def test_a_run_that_meets_its_step_limit_says_so(tmp_path: Path):
     assert result.metrics["pieces"]["trial"]["stages"][-1]["converged"] is False
 
 
-# --- the shipped scenes
-
-# Batch files name scenes; tests/app/batch loads them.
-SHIPPED = [path for path in sorted(SCENES.glob("*.toml")) if not {"scenes", "forms", "tasks"} & read_toml(path).keys()]
-
-# The kinds of openings of each.
-OPENINGS = {
-    path: {str(table["kind"]).removesuffix("s") for table in read_toml(path).get("openings", ())} for path in SHIPPED
-}
-
-# Pieces that only drafting makes, of garments whose seams match on a coarse mesh, too.
-DRAFTED = {
-    "jeans": {"front_left_pocket_facing", "front_left_pocket_bag", "back_left_pocket", "yoke_left"},
-    "leggings": {"leg_left", "abdomen_band"},
-    "leotard": {"thigh_band", "neck_band"},
-}
-
-# Scenes that are run with all their files: a plain piece, one with a cut, one worn stretched, a garment.
-DRAWN = ("dome", "fisheye_dart", "compression_sleeve", "a_line_skirt")
-
-
-def made_light(scene: Scene) -> Scene:
-    """A scene on a coarser mannequin, most without pictures, frames, and patterns to print; `docs/make_gallery.py` runs all as they are."""
-    settings = scene.settings
-    if settings.mannequin is not None and settings.mannequin.size is not None:
-        settings = settings.model_copy(
-            update={"mannequin": settings.mannequin.model_copy(update={"resolution_mm": 40.0})}
-        )
-    if settings.marker is not None:
-        settings = settings.model_copy(update={"marker": settings.marker.model_copy(update={"seconds": 1})})
-    if scene.name in DRAWN:
-        return replace(scene, settings=settings)
-    output = settings.output.model_copy(update={"frames": 0, "picture": False})
-    pattern = settings.pattern.model_copy(update={"formats": ["json"]})
-    return replace(scene, settings=settings.model_copy(update={"output": output, "pattern": pattern}))
-
-
-# The last line of a sheet.
-SHEET = re.compile(r"sheet [A-Z]+\d+  -  ")
-
-
-@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
-def test_every_shipped_scene_converges_unfolded(path: Path, tmp_path: Path):
-    text = path.read_text()
-    assert text.startswith("# ")
-    if "WARPFLAT_DATA" in text and not DATA:
-        pytest.skip("WARPFLAT_DATA is not set: the folder with the real meshes")
-    result = run_scene(made_light(load_scene(path)), tmp_path)
-    for name, piece in result.metrics["pieces"].items():
-        assert piece["stages"][-1]["converged"], name
-        assert piece["flipped_faces"] == 0, name
-    assert "not_drawn" not in result.metrics["pattern"]
-    if path.stem in ("cone", "cylinder"):
-        assert result.metrics["pieces"][path.stem]["length_error"] < 1e-6
-    for name in result.files:
-        assert (tmp_path / name).stat().st_size > 0
-    assert ("frames.usdc" in result.files) == (path.stem in DRAWN)
-    if path.stem in DRAWN:
-        assert validate_usd(tmp_path / "frames.usdc") == []
-    assert json.loads((tmp_path / "metrics.json").read_text())["pieces"].keys() == result.metrics["pieces"].keys()
-    # The pattern as printed: nothing leaves its piece, no word is cut, and every opening is named in every file.
-    pattern = read_pattern_json(tmp_path / "pattern.json")
-    assert faults(pattern) == []
-    if path.stem in DRAFTED:
-        # It can be put on.
-        assert all(ring["passes"] is not False for ring in result.metrics["rings"])
-        assert all(seam.matches for seam in pattern.seams)
-        assert DRAFTED[path.stem] <= {piece.name for pieces in pattern.pieces.values() for piece in pieces}
-    openings = OPENINGS[path]
-    if openings:
-        # A PDF is written and read for one scene of each set of openings, on large sheets: fewer pages have to be read.
-        is_read = path == next(other for other in SHIPPED if OPENINGS[other] == openings)
-        export_patterns(tmp_path, ["svg", "dxf", *["pdf"][: int(is_read)]], out=tmp_path / "opened", paper="A0")
-        own_name = path.stem.replace("_", " ")
-        texts = [(tmp_path / "opened" / f"{path.stem}.{ending}").read_text() for ending in ("svg", "dxf")]
-        if is_read:
-            pages = [page.extract_text() for page in PdfReader(tmp_path / "opened" / "pattern.pdf").pages]
-            guide, sheets = (
-                "".join(page for page in pages if bool(SHEET.search(page)) == wanted) for wanted in (False, True)
-            )
-            assert "Measures" in guide
-            assert "from the back" in guide
-            texts += [guide, sheets]
-        for text in texts:
-            named = set(
-                re.findall(
-                    r"zip|button|vent|slit|keyhole|wrap|godet", text.replace(path.stem, "").replace(own_name, "")
-                )
-            )
-            assert openings <= named
+# --- scripts
 
 
 def test_the_scripted_scene_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):

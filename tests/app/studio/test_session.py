@@ -340,7 +340,7 @@ def test_maps_have_scales_that_hold_the_cloth(tmp_path: Path) -> None:
         assert frame.worn.area[inside].sum() >= 0.97 * frame.worn.area.sum()
         assert scale.high < 5.0 * np.abs(values).max()
         assert not scale.is_blank
-        colours = scale.colours(np.linspace(scale.low, scale.high, 5))
+        colours = scale.rgb(np.linspace(scale.low, scale.high, 5))
         assert len(np.unique(colours.round(3), axis=0)) == 5
     at_vertices = vertex_values(np.full(len(frame.worn.area), 3.0), frame.positions, frame.surface.faces)
     np.testing.assert_allclose(at_vertices, 3.0)

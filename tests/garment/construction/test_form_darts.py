@@ -93,7 +93,8 @@ def test_legs_are_sewn_and_the_mouth_kept(sewn):
 
 def test_girths_are_the_body_and_its_ease(body, sewn):
     girths = sewn.metrics()["girths"]
-    assert list(girths) == ["bust", "underbust", "waist", "abdomen", "hip", "thigh", "knee"]
+    levels = ["bust", "underbust", "waist", "abdomen", "hip", "thigh", "knee"]
+    assert list(girths) == [*levels, "neck", "armhole left", "armhole right"]
     wanted = {level: girth["ease_wanted_m"] for level, girth in girths.items() if "ease_wanted_m" in girth}
     assert wanted == pytest.approx({"bust": 0.05, "waist": 0.025, "hip": 0.03})
     # The skirt bridges the small of the back: it has more than the 3 cm of the preset there.

@@ -18,6 +18,7 @@ from warpflat.garment.mannequin.forms import shipped_form
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.pieces import Pattern, Piece
+from warpflat.pattern.drafting.sewing_order import sewn_seams
 
 ZIP = Opening(kind="zip", line="centre back", length=0.20)
 
@@ -61,6 +62,34 @@ def test_zip_at_centre_back_parts_the_back_and_lets_the_waist_pass(skirt: Garmen
     assert abdomen.opened == pytest.approx(2 * (0.20 - depth), abs=1e-3)
 
 
+def test_a_zip_in_one_side_leaves_left_and_right_one_pattern(mannequin: Mannequin):
+    form = part_at_centres(mannequin.layout, shipped_form("a_line_skirt"), [ZIP, replace(ZIP, line="centre front")])
+    skirt = flatten_form(mannequin, mannequin.form(form), fabric="denim", curves_mm=0.0)
+    pattern = pattern_of(skirt, replace(ZIP, line="side left"))
+    assert {p.name: p.quantity for p in pattern.pieces[""]} == {"front_left": 2, "back_left": 2}
+    drafted = draft_garment(pattern)
+    sides = {seam.name: seam for seam in sewn_seams(drafted, "") if seam.name.startswith("side")}
+    assert [(name, bool(seam.openings)) for name, seam in sides.items()] == [("side left", True), ("side right", False)]
+    # One piece of paper has one letter at its side.
+    assert len({seam.letter for seam in sides.values()}) == 1
+    assert max(seam.notches_mm or 0.0 for seam in drafted.seams) < 0.2
+    # A slit is cut: what has it is drawn for its own side, and nothing else is.
+    slit = pattern_of(skirt, Opening(kind="slit", line="centre back", length=0.1), replace(ZIP, line="side left"))
+    assert {p.name: p.quantity for p in slit.pieces[""]} == {"front_left": 2, "back_left": 2}
+    slit = pattern_of(skirt, Opening(kind="slit", line="side left", length=0.1))
+    assert {p.quantity for p in slit.pieces[""]} == {1}
+
+
+def test_halves_that_rest_a_little_apart_are_drawn_once(skirt: Garment):
+    """A tenth of a millimetre over a side: what a relaxation's tolerance may leave, and more than sides of seams may differ by."""
+    half = skirt.pieces["back_left"]
+    longer = replace(half, positions=half.positions * [1.0, 1.0002])
+    pattern = pattern_of(replace(skirt, pieces={**skirt.pieces, "back_left": longer}), ZIP)
+    assert {p.name: p.quantity for p in pattern.pieces[""]} == {"front": 1, "back_left": 2}
+    edge = pattern.piece("back_left", "").edge("centre back").length
+    assert polyline_length(half.positions[skirt.form.pieces["back_left"].edges["centre back"]]) < edge
+
+
 def test_zip_that_ends_too_early_lets_nothing_pass(skirt: Garment):
     assert not passes(replace(skirt, openings=(replace(ZIP, length=0.05),)))["waist"]
 
@@ -98,7 +127,7 @@ def test_slit_and_vent_are_edges_of_their_own(skirt: Garment):
 
 def test_opening_on_one_side_alone_keeps_both_patterns(skirt: Garment):
     one = Opening(kind="slit", line="side left", length=0.1)
-    assert one_sided([one])
+    assert one_sided([one]) == [one]
     assert not one_sided([one, replace(one, line="side right")])
     assert not one_sided([ZIP])
     assert one_sided([one, replace(one, line="side right", length=0.2)])

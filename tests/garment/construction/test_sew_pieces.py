@@ -144,15 +144,15 @@ def test_a_piece_cut_turned_over_hangs_on_its_side_where_the_mesh_stands_aside_a
     """A back and two fronts, flared, 30 cm off x = 0 and leaning by 4 degrees."""
     lean, parts = np.radians(4.0), {}
     turn = np.array([[np.cos(lean), -np.sin(lean), 0.0], [np.sin(lean), np.cos(lean), 0.0], [0.0, 0.0, 1.0]])
-    v = np.linspace(0.0, 1.0, 13)
+    v = np.linspace(0.0, 1.0, 9)
     for name, start, end in (("front_left", 0.0, 0.5), ("front_right", 0.5, 1.0), ("back", 1.0, 2.0)):
-        count = int(16 * (end - start)) + 1
+        count = int(12 * (end - start)) + 1
         a = np.pi * np.linspace(start, end, count)
         radius = 0.16 - 0.06 * v[None, :]
         points = np.stack(
-            [radius * np.cos(a)[:, None], np.broadcast_to(0.4 * v, (count, 13)), radius * np.sin(a)[:, None]], axis=-1
+            [radius * np.cos(a)[:, None], np.broadcast_to(0.4 * v, (count, 9)), radius * np.sin(a)[:, None]], axis=-1
         ).reshape(-1, 3)
-        at = np.arange(count * 13).reshape(count, 13)
+        at = np.arange(count * 9).reshape(count, 9)
         quads = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 4)
         # Diagonals are mirror images, too.
         left = points[quads].mean(axis=1)[:, 0] > 0.0

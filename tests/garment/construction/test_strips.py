@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from bodies import body_of_size
+from flat_forms import flat_form
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.garment.construction.finishing import Finishing
-from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.garment import Garment
-from warpflat.garment.construction.openings import Opening, part_at_centres
+from warpflat.garment.construction.openings import Opening
 from warpflat.garment.construction.strips import Strip, swept
 from warpflat.garment.construction.to_pattern import pattern_of_garment
-from warpflat.garment.mannequin.forms import Form, shipped_form
 from warpflat.pattern.drafting.draft import draft_garment
+from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.fitting import drawn_length
 from warpflat.pattern.drafting.half_pieces import halved
 from warpflat.pattern.drafting.pieces import Pattern
@@ -27,31 +27,29 @@ from warpflat.pattern.drafting.sewing_order import notions, sewing_steps
 ZIP = Opening(kind="zip", line="centre back", length=0.3)
 
 
-def flat(form: Form, *openings: Opening, half: bool = False) -> Garment:
-    mannequin = body_of_size(30.0)
-    if not half:
-        form = part_at_centres(mannequin.layout, form, openings)
-    garment = flatten_form(mannequin, mannequin.form(form, half=half), fabric="woven", sewn=True, curves_mm=0.0)
-    return replace(garment, openings=openings)
-
-
 @pytest.fixture(scope="module")
 def shirt() -> Garment:
-    return flat(shipped_form("shirt"), ZIP)
+    return flat_form("shirt", ZIP)
 
 
 @pytest.fixture(scope="module")
 def half_skirt() -> Garment:
-    return flat(shipped_form("skirt"), half=True)
+    return flat_form("skirt", half=True)
 
 
 def finished(garment: Garment, *wishes: Finishing) -> Pattern:
     return pattern_of_garment({"": replace(garment, finishing=wishes)}, name="garment")[0]
 
 
+@functools.lru_cache(maxsize=1)
+def drafted_once(pattern: Pattern) -> DraftedGarment:
+    """The pattern as it is drawn, whatever is asked of it."""
+    return draft_garment(pattern)
+
+
 def lengths(pattern: Pattern) -> Mapping[str, tuple[float, float]]:
     """Lengths of both sides of every seam [mm], all of which match."""
-    drafted = draft_garment(pattern)
+    drafted = drafted_once(pattern)
     assert all(seam.matches for seam in drafted.seams)
     return {seam.name: seam.length_mm for seam in drafted.seams}
 
@@ -106,10 +104,10 @@ def test_cuff_is_buttoned_behind_where_the_sleeve_is_slit(shirt: Garment):
     binding = pattern.piece("sleeve_placket", "")
     assert binding.quantity == 2
     assert binding.edge("lower").length > 0.22
-    steps = [step.words for step in sewing_steps(draft_garment(pattern), "")]
+    steps = [step.words for step in sewing_steps(drafted_once(pattern), "")]
     assert any("slits" in step for step in steps)
     assert any("buttonhole at one end" in step and "cuff" in step for step in steps)
-    assert "2 small buttons" in notions(draft_garment(pattern), "")
+    assert "2 small buttons" in notions(drafted_once(pattern), "")
     with pytest.raises(InputError, match="does not lie within the piece"):
         finished(shirt, replace(cuff, placket=0.9))
 
@@ -119,7 +117,7 @@ def test_ruffle_is_gathered_itself(shirt: Garment):
     found = lengths(pattern)["hip ruffle"]
     assert found[1] == pytest.approx(2.2 * found[0], abs=0.1)
     assert pattern.piece("hip_ruffle", "").edge("upper").kind == "hem"
-    assert any("gather the hip ruffle" in step.words for step in sewing_steps(draft_garment(pattern), ""))
+    assert any("gather the hip ruffle" in step.words for step in sewing_steps(drafted_once(pattern), ""))
 
 
 @pytest.mark.parametrize("turns", [0.5, 1.0])
@@ -144,7 +142,7 @@ def test_casing_is_turned_in_and_has_an_elastic_of_the_body(half_skirt: Garment)
     assert half_skirt.mannequin is not None
     girth = half_skirt.mannequin.levels()["waist"].girth
     assert pattern.elastics[0].lengths[""] == pytest.approx(0.9 * girth)
-    drafted = draft_garment(pattern)
+    drafted = drafted_once(pattern)
     assert any("thread elastic" in step.words for step in sewing_steps(drafted, ""))
     assert any("elastic" in notion for notion in notions(drafted, ""))
     with pytest.raises(InputError, match="no free edge 'hip'"):
@@ -164,7 +162,7 @@ def test_pleats_of_a_ruffle_lie_beside_each_other(half_skirt: Garment):
     # A third of each stays visible, and the strip begins and ends in the inner fold of a pleat.
     assert np.array(folds) - ends == pytest.approx(stretch / 3.0)
     assert ends[0] == pytest.approx(stretch / 3.0) == pytest.approx(whole - folds[-1])
-    assert "Lay the pleats" in " ".join(step.words for step in sewing_steps(draft_garment(pattern), ""))
+    assert "Lay the pleats" in " ".join(step.words for step in sewing_steps(drafted_once(pattern), ""))
     lengths(pattern)
 
 
@@ -180,7 +178,7 @@ def test_strip_that_is_wider_than_the_cloth_is_cut_as_equal_panels(shirt: Garmen
     joints = [seam for seam in pattern.seams if seam.name.startswith("hip ruffle ends")]
     assert len(joints) == count
     # All are sewn alike, and where they lie along the edge is marked there, not on the panel.
-    drafted = draft_garment(pattern)
+    drafted = drafted_once(pattern)
     own = [
         notch
         for notch in next(piece for piece in drafted.pieces[""] if piece.name == "hip_ruffle").notches

@@ -14,7 +14,7 @@ from warpflat.app.scene.outside_pattern import OutsideJob, RunGirth, SewingTable
 from warpflat.app.scene.plan import plan_scene
 from warpflat.core.toml_file import read_toml
 from warpflat.flat.flattening.verdict import Verdict, judge
-from warpflat.garment.construction.form_garment import flatten_form
+from warpflat.garment.construction.form_garment import FormGarment, flatten_form
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.to_pattern import pattern_of_garment
 from warpflat.garment.mannequin.mannequin import Mannequin
@@ -100,7 +100,31 @@ def test_a_garment_is_too_large_for_a_smaller_body_than_its_own(block: Garment, 
     found = judge({"pieces": {}, "drape": drape, "girths": job.girths_on_body()})
     assert found is not None
     assert [finding.kind for finding in found.findings if finding.fails][:1] == ([kind] if kind else [])
-    assert found.fits or found.findings[0].words == "too large: bust +13.0 cm, +5.0 were drafted"
+    if kind:
+        assert found.findings[0].words == "too large: bust +13.0 cm, +5.0 were drafted"
+        said = [finding.words.split(" ")[2] for finding in found.findings if finding.fails]
+        assert said == ["bust", "waist", "hip", "neck", "armhole"]
+
+
+@pytest.mark.parametrize("line", ["armhole", "neck"])
+def test_an_armhole_or_a_neck_that_gapes_is_too_large(block: Garment, line: str):
+    """Lengthened by 6 %, which bust, waist and hip do not show."""
+    assert isinstance(block, FormGarment)
+    layout = block.mannequin.layout
+    rows = [layout.lines["neck"]] if line == "neck" else [arm[0] for arm in layout.arms.values()]
+    pieces = {}
+    for name, piece in block.pieces.items():
+        points = piece.positions.copy()
+        for row in rows:
+            on_row = np.isin(block.form.pieces[name].grid_vertices, row)
+            if on_row.any():
+                points[on_row] += 0.06 * (points[on_row] - points[on_row].mean(axis=0))
+        pieces[name] = replace(piece, positions=points)
+    found = verdict_of(replace(block, pieces=pieces))
+    large = [finding for finding in found.findings if finding.kind == "too large"]
+    assert len(large) == 1
+    assert large[0].words.startswith(f"too large: {line} +")
+    assert large[0].remedy == f"take it in at the {line}"
 
 
 def test_the_paper_says_what_a_drape_found(block: Garment):

@@ -260,7 +260,11 @@ def test_a_scene_with_a_drape_reports_it(tmp_path: Path):
     assert {"distance_m", "misfit_m", "bridged_m", "gap_m", "strain_warp", "pressure_pa", "places"} <= set(entry)
 
 
-def test_a_corrected_pattern_halves_the_misfit_and_keeps_its_seams(bodice: warpflat.Garment, worn: warpflat.Drape):
+def test_a_corrected_pattern_halves_the_misfit_and_keeps_its_seams():
+    # In woven cloth a twentieth of it is strained beyond its limit, and how far a round goes before more is hangs on rounding.
+    body = body_of_size(14.0)
+    bodice = warpflat.flatten_form(body, body.form("bodice"), fabric="interlock")
+    worn = warpflat.drape(bodice)
     found = warpflat.correct_pattern(worn, rounds=2)
     assert found.after.converged
     assert found.rounds[-1].misfit < 0.5 * found.rounds[0].misfit

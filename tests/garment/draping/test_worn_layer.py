@@ -15,10 +15,12 @@ from warpflat.core.errors import InputError
 from warpflat.flat.surface.connectivity import border_loops, join_labels
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.triangles import triangulate
+from warpflat.garment.construction.collars import Collar
 from warpflat.garment.construction.finishing import Finishing
 from warpflat.garment.construction.form_garment import FormGarment, flatten_form
 from warpflat.garment.construction.pockets import Pocket
 from warpflat.garment.construction.to_pattern import pattern_of_garment
+from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.continue_pieces import continue_pieces, hood_beside_head
 from warpflat.garment.draping.drape_pattern import Placement, drape_pattern, place_drafted
 from warpflat.garment.draping.lift import surface_lift
@@ -524,12 +526,12 @@ def test_a_hood_is_draped_over_a_head(monkeypatch: pytest.MonkeyPatch):
         assert np.abs(begins[1][name][:, 0]).max() > 1.2 * far
 
 
-def placed_on_a_skirt(**more: object) -> tuple[FormGarment, dict[str, list[Surface]]]:
-    """A skirt with finishing or pockets, and where these are worn."""
+def placed_on(form: str, **more: object) -> tuple[FormGarment, dict[str, list[Surface]]]:
+    """A garment with finishing or pockets, and where these are worn."""
     mannequin = body_of_size(30.0)
-    made = flatten_form(mannequin, mannequin.form(shipped_form("skirt")), fabric="woven", sewn=True, curves_mm=0.0)
+    made = flatten_form(mannequin, mannequin.form(shipped_form(form)), fabric="woven", sewn=True, curves_mm=0.0)
     garment = replace(made, **more)  # type: ignore[arg-type]
-    pattern, _ = pattern_of_garment({"": garment}, name="skirt")
+    pattern, _ = pattern_of_garment({"": garment}, name=form)
     lifts = {
         name: surface_lift(flat.surface.vertices[flat.vertex_origin], flat.positions, triangulate(flat.faces)[0])
         for name, flat in garment.pieces.items()
@@ -542,7 +544,7 @@ def test_a_flounce_falls_from_its_edge_and_a_waistband_stands_on_it():
         Finishing(kind="waistband", edge="waist", width=0.03),
         Finishing(kind="flounce", edge="knee", width=0.2, turns=0.5),
     ]
-    garment, worn = placed_on_a_skirt(finishing=wishes)
+    garment, worn = placed_on("skirt", finishing=wishes)
     cloth = np.concatenate([piece.surface.vertices for piece in garment.pieces.values()])
     low, high = cloth[:, 1].min(), cloth[:, 1].max()
     (band,) = worn.pop("waistband")
@@ -558,7 +560,7 @@ def test_a_flounce_falls_from_its_edge_and_a_waistband_stands_on_it():
 
 def test_a_patch_lies_on_its_piece():
     pocket = Pocket(kind="patch", where="front", width=0.12, height=0.1, line="abdomen", below=0.01)
-    garment, worn = placed_on_a_skirt(pockets=[pocket])
+    garment, worn = placed_on("skirt", pockets=[pocket])
     (name,) = worn
     assert name == "front_pocket"
     cloth = garment.pieces["front"].surface.vertices
@@ -566,3 +568,23 @@ def test_a_patch_lies_on_its_piece():
         far = np.linalg.norm(patch.vertices[:, None] - cloth, axis=2).min(axis=1)
         assert far.max() < 0.03
         assert np.ptp(patch.vertices[:, 1]) == pytest.approx(0.115, abs=0.01)
+
+
+def test_a_turned_down_collar_lies_on_the_garment():
+    collar = Finishing(
+        kind="collar", edge="neck", width=0.07, placket=0.14, collar=Collar(style="convertible", width=0.07)
+    )
+    garment, worn = placed_on("shirt", finishing=[collar])
+    surfaces = [piece.surface for piece in garment.pieces.values()]
+    first = np.cumsum([0, *(len(surface.vertices) for surface in surfaces)])
+    faces = [np.where(each.faces >= 0, each.faces + at, -1) for each, at in zip(surfaces, first, strict=False)]
+    shirt = Body(
+        np.concatenate([each.vertices for each in surfaces]), np.concatenate(faces).astype(np.int32), device=DEVICE
+    )
+    points = np.concatenate([copy.vertices for copies in worn.values() for copy in copies])
+    centre, normal = shirt.nearest(points)
+    height = np.einsum("ij,ij->i", points - centre, normal)
+    assert np.ptp(points[:, 0]) > 0.2
+    assert height.min() > -1e-3
+    # But for the neckline it lies on the cloth, and no chord of it within.
+    assert np.quantile(height, 0.3) > 1e-3

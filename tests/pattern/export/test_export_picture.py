@@ -22,16 +22,14 @@ from warpflat.pattern.drafting.placement import (
     spots_beside,
     spots_beyond_ends,
 )
-from warpflat.pattern.export.colours import SMALLEST_SCALE, energy_colours, energy_scale
+from warpflat.pattern.export.colours import SMALLEST_SCALE, VertexColours, energy_colours, energy_scale
+from warpflat.pattern.export.dressed import Body, crop_body
 from warpflat.pattern.export.figure import GREY, Pen, new_figure, write_figure
-from warpflat.pattern.export.geometry import corner_average, face_areas, outline_edges
+from warpflat.pattern.export.geometry import face_areas, outline_edges
 from warpflat.pattern.export.letters import all_letters, is_drawn, note_on_names, titles
-from warpflat.pattern.export.picture import PicturePiece, draw_figure, write_picture
-from warpflat.pattern.export.picture_drafted import DraftedOutline
-from warpflat.pattern.export.picture_garment import Body, crop_body
-from warpflat.pattern.export.picture_page import BETWEEN, pack_boxes, pack_rows, place_views
-from warpflat.pattern.export.picture_views import Silhouette, make_facets, pattern_view
-from warpflat.pattern.export.raster import Lighting, Samples, rasterise, shade
+from warpflat.pattern.export.packing import pack_boxes, pack_rows
+from warpflat.pattern.export.picture import DraftedOutline, PicturePiece, draw_figure, write_picture
+from warpflat.pattern.export.raster import BACK, LIGHT, Samples, rasterise, shade
 
 
 def find_piece(shape, density=None, **options) -> PicturePiece:
@@ -365,9 +363,8 @@ def test_light_falls_by_the_blended_normal_and_the_reverse_is_greyed() -> None:
     samples = rasterise(points, triangles, (40, 40))
     face = np.arange(len(triangles), dtype=np.int32)
     colours = np.random.default_rng(3).random((len(triangles), 3))
-    light, back = np.array([0.6, 0.0, 0.8]), (0.7, 0.8, 0.9)
-    lighting = Lighting(normals=normals, direction=tuple(2.0 * light), back=back)
-    pixels = shade(samples, 1, points, triangles, colours, face=face, lighting=lighting)
+    light, back = np.array(LIGHT) / np.linalg.norm(LIGHT), BACK
+    pixels = shade(samples, 1, points, triangles, colours, face=face, normals=normals)
     assert (pixels[..., 3] == 255).all()
     for row, column in np.random.default_rng(4).integers(0, 40, (200, 2)):
         triangle = samples.triangle[row, column]
@@ -388,10 +385,11 @@ def test_a_triangle_lit_by_its_own_normal_has_one_colour() -> None:
     samples = rasterise(points, triangles, (40, 40))
     own = np.tile([0.0, 0.0, 3.0], (len(triangles), 1))
     face = np.zeros(len(triangles), dtype=np.int32)
-    lighting = Lighting(normals=own, at_vertices=False)
-    pixels = shade(samples, 2, points, triangles, np.array([[0.2, 0.4, 0.6]]), face=face, lighting=lighting)
+    colour = np.array([[0.2, 0.4, 0.6]])
+    pixels = shade(samples, 2, points, triangles, colour, face=face, normals=own, at_vertices=False)
     assert pixels.shape == (20, 20, 4)
-    np.testing.assert_array_equal(pixels.reshape(-1, 4), np.tile([54, 107, 161, 255], (400, 1)))
+    shade_of = np.round(255.0 * colour[0] * (0.55 + 0.50 * LIGHT[2] / np.linalg.norm(LIGHT)))
+    np.testing.assert_array_equal(pixels.reshape(-1, 4), np.tile([*shade_of, 255], (400, 1)))
 
 
 def test_samples_are_averaged_over_what_is_covered() -> None:
@@ -435,10 +433,9 @@ def test_outline_is_the_border_with_holes_and_cracks() -> None:
 def test_areas_and_averages_survive_slivers() -> None:
     shape = mixed()
     np.testing.assert_allclose(face_areas(shape.vertices[:, :2], shape.faces), np.array([1.0, 0.5, 0.5]) / 9.0)
-    average = corner_average(
-        np.array([1.0, 3.0]), np.array([0.0, 0.0]), np.array([0, 0, 1], np.int32), np.array([0, 1, 1], np.int32), 3
-    )
-    np.testing.assert_allclose(average, [1.0, 2.0, 0.0])
+    corners = np.array([[0, 1, 3, -1], [1, 3, 4, -1]], np.int32)
+    average = VertexColours(corners, np.zeros(2), 5).mean(np.array([1.0, 3.0]))
+    np.testing.assert_allclose(average, [1.0, 2.0, 0.0, 2.0, 3.0])
 
 
 def test_labels_do_not_overlap() -> None:
@@ -547,27 +544,6 @@ def test_names_across_a_narrow_piece_stand_beside_it(tmp_path: Path, monkeypatch
         assert [text for text, _, _ in by_height] == list(lines)
         assert np.ptp([x for _, x, _ in view]) < 0.6
         assert np.diff([y for _, _, y in by_height]).min() > 0.1
-
-
-def test_views_reach_into_each_others_boxes_as_far_as_their_outlines_allow() -> None:
-    # A roof above a valley: the lower view's sides rise beside the upper one's ridge turned down.
-    upper = np.array([[0.0, 1.0, 0.0], [2.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
-    lower = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [2.0, 1.0, 0.0], [1.0, -1.0, 0.0]])
-    tip = Silhouette(pattern_view(upper[:, :2], make_facets(np.array([[0, 1, 2, -1]], np.int32)), {}))
-    valley_faces = np.array([[0, 3, 1, -1], [1, 3, 2, -1]], np.int32)
-    valley = Silhouette(pattern_view(lower[:, :2], make_facets(valley_faces), {}))
-    assert tip.area == pytest.approx(1.0, rel=0.02)
-    assert tip.overlap_below(valley, 0.0) == pytest.approx(1.0, abs=0.03)
-    assert tip.overlap_below(tip, 0.0) == pytest.approx(0.0, abs=0.03)
-    assert valley.room_above(0.9, 1.1) == pytest.approx(0.9, abs=0.03)
-    assert valley.room_above(2.1, 3.0) == np.inf
-    beside, below = (
-        place_views([tip, valley], 2.0, width=w, stacked=s, words=[], top=0.5, has_headings=False)
-        for w, s in ((8.0, False), (4.0, True))
-    )
-    assert [left for left, _ in beside] == [0.0, 4.0]
-    # The lower edge of the upper box is at 2.5; the other box begins a metre, which is two inches, higher, and a gap below.
-    assert below[1][1] == pytest.approx(2.5 - 2.0 + BETWEEN, abs=0.06)
 
 
 def test_cloth_without_strain_has_no_scale_of_colours(tmp_path: Path) -> None:

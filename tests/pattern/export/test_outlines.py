@@ -126,6 +126,14 @@ def test_an_outline_that_crosses_itself_at_a_corner_keeps_its_outer_ring(tmp_pat
         drawing.read(tmp_path)
 
 
+def test_a_scribble_is_refused_before_its_crossings_are_sought(tmp_path: Path) -> None:
+    """A star of 4,000 points, each a radian on, has some three million crossings."""
+    turn = np.arange(4000.0)
+    points = " L".join(f"{x:.3f} {y:.3f}" for x, y in 200.0 + 150.0 * np.column_stack([np.cos(turn), np.sin(turn)]))
+    with pytest.raises(InputError, match="crosses itself all over, 575 m of it"):
+        svg(tmp_path, f'<path id="a" d="M{points} Z"/>')
+
+
 def test_every_block_is_a_piece_or_is_named(tmp_path: Path) -> None:
     drawing = Drawing()
     two = drawing.block("two")

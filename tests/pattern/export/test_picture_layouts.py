@@ -21,16 +21,19 @@ from warpflat.flat.fabric.library import find_fabric
 from warpflat.flat.fabric.limits import Amount, Demand
 from warpflat.flat.model.fit import MAPS as MAPS_OF_FIT
 from warpflat.flat.model.fit import Misfit, WornFit
-from warpflat.garment.draping import correction_picture, picture
 from warpflat.garment.draping.correct_pattern import Correction
+from warpflat.garment.draping.correction_picture import write_correction_picture
+from warpflat.garment.draping.picture import write_compared_drapes, write_drape_picture
 from warpflat.pattern.drafting.drafted import SeamReport
 from warpflat.pattern.drafting.walked import WalkedSeam
-from warpflat.pattern.export import fit_picture, ledger_picture, picture_walked
+from warpflat.pattern.export.dressed import Body
 from warpflat.pattern.export.figure import DPI, PAGE_WIDTH, keep_words_on_page, new_figure
+from warpflat.pattern.export.fit_picture import write_wear_sheet
 from warpflat.pattern.export.geometry import face_areas
+from warpflat.pattern.export.ledger_picture import write_ledger_picture
 from warpflat.pattern.export.letters import all_letters
 from warpflat.pattern.export.picture import PicturePiece, draw_figure
-from warpflat.pattern.export.picture_garment import Body
+from warpflat.pattern.export.walked_picture import write_walked_picture
 
 EXAMPLES = int(os.environ.get("WARPFLAT_LAYOUTS", "0"))
 LONGEST_SIDE, PIXELS = 60_000, 150_000_000
@@ -174,11 +177,13 @@ def test_words_stay_on_a_page_whose_axes_take_the_scale_of_their_outlines() -> N
     assert faults_of_page(figure) == []
 
 
-def faults_written(module: Any, write: Any, *arguments: Any, **options: Any) -> list[str]:
-    """What is wrong with the page that a function of a module draws for a file; that there is none, too."""
+def faults_written(write: Any, *arguments: Any, **options: Any) -> list[str]:
+    """What is wrong with the page that a function draws for a file; that there is none, too."""
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
         pages: list[list[str]] = []
-        patch.setattr(module, "write_figure", lambda path, figure: pages.append(faults_of_page(figure)))
+        patch.setattr(
+            "warpflat.pattern.export.figure.write_figure", lambda path, figure: pages.append(faults_of_page(figure))
+        )
         write(Path(folder) / "a.png", *arguments, **options)
     return [fault for faults in pages for fault in faults] if pages else ["no page"]
 
@@ -217,24 +222,13 @@ def worn(draw: st.DrawFn) -> Any:
 
 
 @examples(3, 0.2)
-@given(worn())
-def test_fit_of_any_piece(piece: Any) -> None:
-    assert faults_written(fit_picture, fit_picture.write_wear_picture, piece) == []
-
-
-@examples(3, 0.2)
 @given(st.lists(worn(), min_size=1, max_size=30), NAMES, st.booleans())
 def test_fit_of_any_pieces(pieces: list[Any], title: str, on_form: bool) -> None:
     on_body = [
         {key: np.where(np.arange(len(piece.faces)) % 2 == 0, 0.1, np.nan) for key in ("body_strain", "body_pressure")}
         for piece in pieces
     ]
-    assert (
-        faults_written(
-            fit_picture, fit_picture.write_wear_sheet, pieces, title=title, on_body=on_body if on_form else []
-        )
-        == []
-    )
+    assert faults_written(write_wear_sheet, pieces, title=title, on_body=on_body if on_form else []) == []
 
 
 @st.composite
@@ -262,7 +256,7 @@ def seams(draw: st.DrawFn) -> WalkedSeam:
 @examples(4, 0.2)
 @given(st.lists(seams(), min_size=1, max_size=60), NAMES)
 def test_walk_of_any_seams(walked: list[WalkedSeam], title: str) -> None:
-    assert faults_written(picture_walked, picture_walked.write_walked_picture, walked, title=title) == []
+    assert faults_written(write_walked_picture, walked, title=title) == []
 
 
 @examples(3, 0.2)
@@ -290,7 +284,7 @@ def test_ledger_of_any_piece(piece: PicturePiece, names: list[str], data: st.Dat
         worn=SimpleNamespace(area=face_areas(shape.vertices, shape.faces)),
     )
     ledger = SimpleNamespace(name=shape.name, pieces=[result], entries=entries, peaks=[])
-    assert faults_written(ledger_picture, ledger_picture.write_ledger_picture, ledger) == []
+    assert faults_written(write_ledger_picture, ledger) == []
 
 
 @examples(3, 0.2)
@@ -331,9 +325,9 @@ def test_drape_and_correction_of_any_pieces(worn_pieces: list[Any], fabric: str,
         )
 
     drape = drape_of(flat)
-    assert faults_written(picture, picture.write_drape_picture, drape) == []
+    assert faults_written(write_drape_picture, drape) == []
     both = {fabric: drape, "another": drape}
-    assert faults_written(picture, picture.write_compared_drapes, both) == []
+    assert faults_written(write_compared_drapes, both) == []
     rounds = [SimpleNamespace(misfit=0.01)]
     correction = Correction(before=drape, after=drape_of(1.01 * flat), rounds=tuple(rounds), reason="")  # type: ignore[arg-type]
-    assert faults_written(correction_picture, correction_picture.write_correction_picture, correction) == []
+    assert faults_written(write_correction_picture, correction) == []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,23 +10,33 @@ import numpy as np
 
 from warpflat.app.review.film import FilmPiece, open_film
 from warpflat.app.review.page import read_run
-from warpflat.core import InputError, IntArray, atomic_path, output_folder, reading, record_file
-from warpflat.flat import triangulate
-from warpflat.pattern import SMALLEST_SCALE, energy_colours, outline_edges, rasterise, shade, write_moving_picture
+from warpflat.core import FloatArray, InputError, atomic_path, output_folder, reading, record_file
+from warpflat.pattern import (
+    DPI,
+    SMALLEST_SCALE,
+    DrawnView,
+    Facets,
+    Pen,
+    Scale,
+    View,
+    all_letters,
+    make_facets,
+    outline_edges,
+    pattern_view,
+    picture_of,
+    write_moving_picture,
+)
 
 if TYPE_CHECKING:
     from PIL import Image
 
 __all__ = ["write_moving_pictures"]
 
-_LONG_SIDE, _SHEET_SIDE = 720, 360
+_LONG_SIDE, _SHEET_SIDE = 680, 340  # of the patterns [pixels]
 _FRAMES, _SHEET = 60, (4, 3)
-_MARGIN = 12
 _RATE = 24
-_PAPER = 249
-_INK, _OUTLINE = (38, 40, 48), 200
-# Room for the line below a picture.
-_FOOT = 18
+_MARGIN, _FOOT, _NARROWEST = 0.08, 0.18, 2.2  # [in]; below a picture there is room for a line of words
+_SIZE = 6.0  # [pt]
 
 
 def write_moving_pictures(folder: Path, *, film: bool, sheet: bool) -> list[str]:
@@ -56,7 +65,7 @@ def write_moving_pictures(folder: Path, *, film: bool, sheet: bool) -> list[str]
             columns, rows = _SHEET
             images = _images(pieces, _evenly(pieces[0].times, columns * rows), _SHEET_SIDE)
             cell = images[0].size
-            page = Image.new("RGB", (columns * cell[0], rows * cell[1]), (_PAPER,) * 3)
+            page = Image.new("RGB", (columns * cell[0], rows * cell[1]), "white")
             for number, image in enumerate(images):
                 page.paste(image, (number % columns * cell[0], number // columns * cell[1]))
             with atomic_path(folder / "contact_sheet.png") as temporary:
@@ -74,68 +83,51 @@ def _evenly(times: Sequence[int], most: int) -> list[int]:
 
 def _images(pieces: Sequence[FilmPiece], times: Sequence[int], long_side: int) -> list[Image.Image]:
     """Return pictures of all patterns at these frames, RGB, of one size."""
-    from PIL import Image, ImageDraw
-
-    topologies = dict[str, list[_Drawn]]()
-    for piece in pieces:
-        for shape in map(piece.shape, piece.changes):
-            triangles, face = triangulate(shape.faces)
-            drawn = _Drawn(triangles=triangles, face=face, edges=outline_edges(shape.faces), count=len(shape.surface))
-            topologies.setdefault(piece.name, []).append(drawn)
-    frames = []
+    shapes = {piece.name: [piece.shape(change) for change in piece.changes] for piece in pieces}
+    facets = dict[tuple[int, ...], Facets]()
+    views, densities = list[View](), list[FloatArray]()
     for time in times:
-        frame = []
-        for piece in pieces:
-            at = min(time, piece.times[-1])
-            drawn = topologies[piece.name][max(sum(change <= at for change in piece.changes) - 1, 0)]
-            frame.append((drawn, piece.positions(at, drawn.count) + piece.offset[:2], piece.density(at)))
-        frames.append(frame)
-    everything = np.concatenate([points for frame in frames for _, points, _ in frame])
-    low, size = everything.min(axis=0), np.ptp(everything, axis=0)
-    scale = (long_side - 2 * _MARGIN - _FOOT) / float(size.max())
-    wide, high = (int(2 * np.ceil((extent * scale + 2 * _MARGIN) / 2)) for extent in size)
-    first, images = pieces[0], list[Image.Image]()
-    for frame, time in zip(frames, times, strict=True):
-        # The patterns, coloured by energy, with their outlines.
-        colours = np.full((high, wide, 3), float(_PAPER))
-        lines = Image.new("L", (2 * wide, 2 * high))
-        pen = ImageDraw.Draw(lines)
-        for drawn, points, density in frame:
-            grid = np.zeros((len(points), 3))
-            grid[:, 0] = 2.0 * ((points[:, 0] - low[0]) * scale + _MARGIN)
-            grid[:, 1] = 2.0 * (high - (points[:, 1] - low[1]) * scale - _MARGIN)
-            samples = rasterise(grid, drawn.triangles, (2 * high, 2 * wide))
-            pixels = shade(samples, 2, grid, drawn.triangles, energy_colours(density, first.scale), face=drawn.face)
-            cover = pixels[..., 3:] / 255.0
-            colours = colours * (1.0 - cover) + pixels[..., :3] * cover
-            for begin, end in grid[drawn.edges, :2].tolist():
-                pen.line((*begin, *end), fill=_OUTLINE, width=2)
-        image = Image.fromarray(np.round(colours).astype(np.uint8))
-        image.paste(_INK, mask=lines.reduce(2))
-        # The line below: which frame it is, and the scale of its colours.
-        page = Image.new("RGB", (wide, high + _FOOT), (_PAPER,) * 3)
-        page.paste(image)
-        pen, middle = ImageDraw.Draw(page), high + _FOOT // 2 - 2
-        words = f"{first.measure('stage', time) or 'frame'} {time}/{first.times[-1]}"
-        pen.text((_MARGIN, middle), words, fill=_INK, anchor="lm")
-        if first.scale <= SMALLEST_SCALE:
-            pen.text((wide - _MARGIN, middle), "no strain", fill=_INK, anchor="rm")
-        else:
-            limit = f"{first.scale:.3g} J/m2"  # the font has no superscripts
-            right = wide - _MARGIN - int(pen.textlength(limit))
-            ramp = np.round(255.0 * energy_colours(np.linspace(0.0, 1.0, 60), 1.0)).astype(np.uint8)
-            page.paste(Image.fromarray(np.tile(ramp, (8, 1, 1))), (right - 66, middle - 4))
-            for x, text in ((right - 76, "0"), (right, limit)):
-                pen.text((x, middle), text, fill=_INK, anchor="lm")
-        images.append(page)
+        moments = [min(time, piece.times[-1]) for piece in pieces]
+        numbers = tuple(
+            max(sum(change <= at for change in piece.changes) - 1, 0) for piece, at in zip(pieces, moments, strict=True)
+        )
+        shown = [shapes[piece.name][number] for piece, number in zip(pieces, numbers, strict=True)]
+        counts = np.cumsum([0, *(len(shape.surface) for shape in shown)])
+        if numbers not in facets:
+            faces = [
+                np.where(shape.faces >= 0, shape.faces + first, -1) for shape, first in zip(shown, counts, strict=False)
+            ]
+            joined = np.concatenate(faces).astype(np.int32)
+            facets[numbers] = make_facets(joined, outline_edges(joined))
+        points = [
+            piece.positions(at, len(shape.surface)) + piece.offset[:2]
+            for piece, at, shape in zip(pieces, moments, shown, strict=True)
+        ]
+        views.append(pattern_view(np.concatenate(points), facets[numbers], {}))
+        densities.append(np.concatenate([piece.density(at) for piece, at in zip(pieces, moments, strict=True)]))
+    low = np.min([view.low for view in views], axis=0)
+    size = np.max([view.low + view.size for view in views], axis=0) - low
+    first, images = pieces[0], []
+    scale, per_metre = Scale(high=first.scale), long_side / DPI / float(size.max())
+    wide, high = (per_metre * float(side) + 2 * _MARGIN for side in size[:2])
+    with all_letters():
+        pen = Pen(max(wide, _NARROWEST), high + _FOOT)
+        if first.scale > SMALLEST_SCALE:
+            limit = f"{first.scale:.3g} J/m²"
+            end = pen.width - _MARGIN - pen.measure(limit, _SIZE)[0] - 0.05
+            bar = pen.colour_bar(scale, end - 0.6, 0.1, 0.6, 0.08, extend="neither")
+            bar.set_ticks([])
+        for view, density, time in zip(views, densities, times, strict=True):
+            pen.clear()
+            left, bottom = (view.low - low)[:2] * per_metre + (_MARGIN, _MARGIN + _FOOT)
+            drawn = DrawnView(pen, view, left=float(left), bottom=float(bottom), inches_per_metre=per_metre)
+            drawn.draw(scale.rgb(density), outline=0.5)
+            words = f"{first.measure('stage', time) or 'frame'} {time}/{first.times[-1]}"
+            pen.write(_MARGIN, 0.14, words, _SIZE)
+            if first.scale <= SMALLEST_SCALE:
+                pen.write(pen.width - _MARGIN, 0.14, "no strain", _SIZE, ha="right")
+            else:
+                pen.write(end - 0.65, 0.14, "0", _SIZE, ha="right")
+                pen.write(end + 0.05, 0.14, limit, _SIZE)
+            images.append(picture_of(pen.figure))
     return images
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Drawn:
-    """What is drawn of a piece in one topology: triangles (#T by 3), the face of each, border edges (#B by 2), number of vertices."""
-
-    triangles: IntArray
-    face: IntArray
-    edges: IntArray
-    count: int

@@ -294,9 +294,9 @@ def _measure_fit(
         if not isinstance(garment, FormGarment):
             for name, part in advised.parts.items():
                 with optional_file(file_in(folder, name, ".wear.png"), files) as path:
-                    from warpflat.pattern import write_wear_picture
+                    from warpflat.pattern import write_wear_sheet
 
-                    write_wear_picture(path, part)
+                    write_wear_sheet(path, [part], title=name)
         else:
             with optional_file(folder / "wear.png", files) as path:
                 from warpflat.pattern import write_wear_sheet

@@ -19,7 +19,7 @@ from warpflat.app.studio.cut_tables import cut_along, cut_between, cuttable_line
 from warpflat.app.studio.door import Door
 from warpflat.app.studio.frame import PieceFrame
 from warpflat.app.studio.handles import Handle, pattern_handles
-from warpflat.app.studio.maps import Scale, drape_gaps, drape_scale, piece_scale
+from warpflat.app.studio.maps import MapScale, drape_gaps, drape_scale, piece_scale
 from warpflat.app.studio.messages import read_message
 from warpflat.app.studio.panel import Actions, Panel
 from warpflat.app.studio.pick import Hit, nearest_line
@@ -75,7 +75,7 @@ class Page:
         self.server, self.url = server, self.door.url
         self._kind = "energy"
         self._drape_of: Step | None = None  # whose drape has been asked for
-        self.scale: Scale | None = None
+        self.scale: MapScale | None = None
         self._two_points, self._points = False, list[Hit]()
         self._picked: tuple[str, str] | None = None
         self._marked_in: Step | None = None  # the step in which line and points were picked

@@ -8,9 +8,7 @@ from html import escape
 from typing import Any
 from urllib.parse import quote
 
-import numpy as np
-
-from warpflat.app.studio.maps import MAPS, Scale
+from warpflat.app.studio.maps import MAPS, MapScale
 from warpflat.app.studio.save import Saved
 from warpflat.app.studio.session import Preview, Session
 from warpflat.app.studio.solve import Solution
@@ -163,7 +161,7 @@ class Panel:
             self._part.value = (0, 100)
         self._line.value = wanted if wanted in options else _NO_LINE
 
-    def show_scale(self, scale: Scale | None) -> None:
+    def show_scale(self, scale: MapScale | None) -> None:
         """Show the scale of the map; None while there is none."""
         self._legend.content = "" if scale is None else _legend(scale)
 
@@ -290,16 +288,14 @@ def preview_words(preview: Preview) -> str:
     return words if preview.opening is None else f"{words}, opens <b>{1e3 * preview.opening:.1f} mm</b>"
 
 
-def _legend(scale: Scale) -> str:
+def _legend(scale: MapScale) -> str:
     """Return the scale of a map."""
     if scale.is_blank:
         return "<div style='padding:0.3em 0.9em'>nothing to be seen: the cloth lies without strain</div>"
-    steps = [scale.low + (scale.high - scale.low) * k / 16.0 for k in range(17)]
-    stops = ",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in 255.0 * scale.colours(np.array(steps)))
     ends = [scale.low, 0.5 * (scale.low + scale.high), scale.high]
     ticks = "".join(f"<span>{value:.3g}</span>" for value in ends)
     return (
         f"<div style='padding:0.1em 0.9em;font-size:0.85em'>{MAPS[scale.kind]}"
-        f"<div style='height:0.9em;border:1px solid #999;background:linear-gradient(90deg,{stops})'></div>"
+        f"<div style='height:0.9em;border:1px solid #999;background:linear-gradient(90deg,{scale.css()})'></div>"
         f"<div style='display:flex;justify-content:space-between'>{ticks}</div></div>"
     )

@@ -13,7 +13,7 @@ from trimesh import Trimesh
 
 from warpflat.app.studio.frame import PieceFrame
 from warpflat.app.studio.glb import coloured_mesh
-from warpflat.app.studio.maps import Scale, face_values, vertex_values
+from warpflat.app.studio.maps import MapScale, face_values, vertex_values
 from warpflat.app.studio.pick import Hit, pick_flat, pick_on_rays
 from warpflat.core import FloatArray, IntArray
 from warpflat.flat import Surface, triangulate, vertex_normals
@@ -94,7 +94,7 @@ class Stage:
         self._boxes = np.array([[points.min(axis=0), points.max(axis=0)] for points in (space, flat)])
         self._place()
 
-    def draw(self, pieces: Mapping[str, Shown], scale: Scale, *, tentative: bool = False) -> None:
+    def draw(self, pieces: Mapping[str, Shown], scale: MapScale, *, tentative: bool = False) -> None:
         """Draw pieces in the colours of a map.
 
         Args:
@@ -113,7 +113,7 @@ class Stage:
             triangles.append(corners + count)
             space.append(piece.space)
             flat.append(self._flat(name, piece))
-            colours.append(scale.colours(piece.values))
+            colours.append(scale.rgb(piece.values))
             edges.append(flat[-1][outline_edges(piece.frame.surface.faces)])
             count += len(piece.space)
         shared = np.concatenate(triangles), np.concatenate(colours)

@@ -24,7 +24,7 @@ _COMFORT = 5.9e3
 # A garment is too large if its girth exceeds the drafted one by this share: two thirds of the step between sizes, 4 cm on 88.
 _TOO_LARGE = 0.03
 # Girths that every garment is judged by; others where ease was asked for.
-_MAIN_GIRTHS = ("bust", "waist", "hip")
+_MAIN_GIRTHS = ("bust", "waist", "hip", "neck", "armhole")
 # Ease that is missed by more is told [m].
 _EASE_MISSED = 5e-3
 # Left and right are one where their ease is equal within this [m].
@@ -185,7 +185,7 @@ def _girths(girths: Mapping[str, Mapping[str, float]]) -> list[Finding]:
             continue
         name, asked = without_side(level) if alike else level, girth.get("ease_wanted_m")
         ease, drafted = girth["ease_m"], girth["form_m"] - girth["body_m"]
-        if (asked is not None or level in _MAIN_GIRTHS) and ease - drafted > _TOO_LARGE * girth["form_m"]:
+        if (asked is not None or without_side(level) in _MAIN_GIRTHS) and ease - drafted > _TOO_LARGE * girth["form_m"]:
             found.append(
                 Finding(
                     kind="too large",

@@ -233,7 +233,9 @@ def _told(seam: Seam, copies: Mapping[str, _Copy]) -> Seam:
 def _run_alike(seams: Sequence[Seam]) -> tuple[Seam, ...] | None:
     """Return the seams, each along an edge in the direction in which others run along its copies; None if they cannot."""
     way: dict[tuple[str, str], bool] = {}
-    copied = {(s.piece, s.edge) for seam in seams for row in seam.sides for s in row if not s.is_drawn}
+    # A row of several edges, as a waist's, keeps its order: two of them may be one edge and its mirror image.
+    single = [row[0] for seam in seams for row in seam.sides if len(row) == 1]
+    copied = {(s.piece, s.edge) for s in single if not s.is_drawn}
     waiting = list(enumerate(seams))
     made: dict[int, Seam] = {}
     while waiting:

@@ -1,15 +1,19 @@
-"""Girths: what a tape reads around the body, around the form, and along the pattern with its darts and seams closed."""
+"""Girths: what a tape reads around the body, around the form, and along the pattern with its darts and seams closed.
+
+Around trunk, arms and legs tapes are level; at the neck and around an armhole they follow the line.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, IntArray, without_side
+from warpflat.core import FloatArray, IntArray, segment_lengths, without_side
 from warpflat.garment.construction.constraints import KeptGirth
-from warpflat.garment.construction.tapes import PieceEdges, stretch_tape
+from warpflat.garment.construction.tapes import ALONG, PieceEdges, RowEdges, stretch_tape
 from warpflat.garment.construction.wearer import body_rows
 from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS, RING_LEVELS
 from warpflat.garment.mannequin.profiles import convex_girth
@@ -23,22 +27,30 @@ __all__ = ["girth_constraints", "pattern_girths"]
 
 
 def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]) -> list[KeptGirth]:
-    """Return constraints that give every level of trunk, arms and legs the ease that a form asks for.
+    """Return constraints that give every level the ease that a form asks for, and armholes with sleeves their length.
 
-    Cloth at rest loses some of it to strain, or has more elsewhere.
+    Cloth at rest loses some of the ease to strain, or has more elsewhere. An armhole gives way to the longer cap that is
+    eased into it.
 
     Args:
         mannequin: the body.
         form: on it.
         positions: by piece, #V by 2, at rest without these constraints [m].
     """
-    found, piece_edges = [], PieceEdges(mannequin.layout, form)
+    layout, piece_edges = mannequin.layout, PieceEdges(mannequin.layout, form)
+    sleeves = np.concatenate([np.empty(0), *(form.pieces[cap].grid_vertices for cap in _caps(layout, form))])
     limbs = {name: (row, axis) for (name, _), row, _, axis in body_rows(mannequin)}
+    lines = _lines(layout, form)
+    found = []
     for level, girth in pattern_girths(mannequin, form, positions).items():
-        if "ease_wanted_m" not in girth:
+        if "ease_wanted_m" in girth:
+            edges = piece_edges.along(*([_row(layout, level)] if level in RING_LEVELS else limbs[level]))
+            factor = (girth["body_m"] + girth["ease_wanted_m"]) / girth["pattern_m"]
+        elif level in lines and np.isin(lines[level][0], sleeves).all():
+            edges = lines[level][1]
+            factor = girth["form_m"] / girth["pattern_m"]
+        else:
             continue
-        factor = (girth["body_m"] + girth["ease_wanted_m"]) / girth["pattern_m"]
-        edges = piece_edges.along(*([_row(mannequin.layout, level)] if level in RING_LEVELS else limbs[level]))
         assert edges is not None
         found.append(
             KeptGirth(
@@ -57,7 +69,7 @@ def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping
 def pattern_girths(
     mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]
 ) -> dict[str, dict[str, float]]:
-    """Return the entry `girths` of `metrics.json` for every closed level of trunk, arms and legs that the pieces go around.
+    """Return the entry `girths` of `metrics.json`: levels of trunk, arms and legs, neck and armholes that the pieces go around.
 
     The pattern's girth is the length of the level's line in the pieces: a dart on the way adds nothing, nor does a seam. Where
     two pieces meet along the level it is the mean of both. A half piece counts twice. Where the line slopes on the form, as at
@@ -86,6 +98,12 @@ def pattern_girths(
         }
         if level in form.ease:
             found[level]["ease_wanted_m"] = 0.01 * form.ease[level]
+    for name, (row, edges) in _lines(layout, form).items():
+        pattern = float(edges.lengths(positions, len(row)).sum())
+        body, designed = (
+            float(segment_lengths(points[row], closed=True).sum()) for points in (mannequin.vertices, form.vertices)
+        )
+        found[name] = {"body_m": body, "form_m": designed, "pattern_m": pattern, "ease_m": pattern - body}
     # Of limbs what the recipe asks for, but between ruled levels, where cloth hangs.
     limbs, asked = [*ARM_LEVELS, *LEG_LEVELS], form.recipe.ease
     spans = [sorted(map(limbs.index, pair)) for pair in form.recipe.ruled if set(pair) <= set(limbs)]
@@ -101,6 +119,23 @@ def pattern_girths(
         if level in asked and not any(low < limbs.index(level) < high for low, high in spans):
             found[name]["ease_wanted_m"] = 0.01 * asked[level]
     return found
+
+
+def _caps(layout: Layout, form: FormResult) -> set[str]:
+    """Return the pieces that cover an arm beyond its armhole."""
+    beyond = np.concatenate([arm[1:].ravel() for arm in layout.arms.values()])
+    return {name for name, piece in form.pieces.items() if np.isin(piece.grid_vertices, beyond).any()}
+
+
+def _lines(layout: Layout, form: FormResult) -> dict[str, tuple[IntArray, RowEdges]]:
+    """Return the lines around neck and armholes, where pieces of the trunk go around: the grid's vertices, the edges."""
+    caps = _caps(layout, form)
+    if len(caps) == len(form.pieces):
+        return {}
+    trunk = PieceEdges(layout, replace(form, pieces={n: piece for n, piece in form.pieces.items() if n not in caps}))
+    lines = {"neck": layout.lines["neck"][:-1], **{f"armhole {side}": arm[0] for side, arm in layout.arms.items()}}
+    found = {name: (row, trunk.along(row, ALONG)) for name, row in lines.items()}
+    return {name: (row, edges) for name, (row, edges) in found.items() if edges is not None}
 
 
 def _row(layout: Layout, level: str) -> IntArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -14,10 +14,12 @@ from warpflat.pattern import Piece, Seam, SeamSide
 if TYPE_CHECKING:
     from warpflat.garment.construction.garment import Garment
 
-__all__ = ["MirrorPair", "find_mirror_pairs", "sew_mirror_pairs"]
+__all__ = ["MirrorPair", "evened", "find_mirror_pairs", "sew_mirror_pairs"]
 
 #: Edges of a pair that is cut by one pattern agree in length, up to each of their points, within this [m].
 SAME_LENGTH = 5e-5
+# What rests farther [m] from the mean of itself and its mirror image is not meant to be symmetric.
+_EVEN = 2.5e-4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,8 +37,31 @@ class MirrorPair:
     edges: Mapping[str, str]
 
 
+def evened(garment: Garment) -> Garment:
+    """Return a garment with each piece as the mean of itself and its mirror image, if all pieces have one.
+
+    A relaxation ends as far to the left or right of its symmetric rest as its tolerance leaves, some hundredths of a millimetre.
+    """
+    mates = {name: mate for pair in garment.pairs for name, mate in (pair, pair[::-1])}
+    pieces = {}
+    for name, piece in garment.pieces.items():
+        mate = mates.get(name, name)
+        images = garment.mirror_vertices(name, mate)
+        if images is None:
+            return garment
+        here, there = piece.positions, garment.pieces[mate].positions[images] * [-1.0, 1.0]
+        move = 0.5 * ((there - there.mean(axis=0)) - (here - here.mean(axis=0)))
+        if np.abs(move).max() > _EVEN:
+            return garment
+        pieces[name] = replace(piece, positions=here + move)
+    return replace(garment, pieces=pieces)
+
+
 def find_mirror_pairs(
-    garments: Mapping[str, Garment], pieces: Mapping[str, Sequence[Piece]], seams: Sequence[Seam]
+    garments: Mapping[str, Garment],
+    pieces: Mapping[str, Sequence[Piece]],
+    seams: Sequence[Seam],
+    unlike: Collection[str] = (),
 ) -> tuple[MirrorPair, ...]:
     """Find pieces that are mirror images in every size, with equal edges, and whose seams are mirror images too.
 
@@ -44,11 +69,12 @@ def find_mirror_pairs(
         garments: flattened, by size.
         pieces: their patterns, all of them.
         seams: between these.
+        unlike: pieces that are going to be cut unlike their mirror images.
     """
     every = [set(garment.pairs) for garment in garments.values()]
     found: list[MirrorPair] = []
     for first, second in next(iter(garments.values())).pairs:
-        if not all((first, second) in pairs for pairs in every):
+        if first in unlike or second in unlike or not all((first, second) in pairs for pairs in every):
             continue
         matched = [_matching_edges(garments[size], pieces[size], first, second) for size in garments]
         if matched[0] is not None and all(edges == matched[0] for edges in matched):

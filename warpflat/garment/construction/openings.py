@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest
+from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest, other_side, without_side
 from warpflat.garment.construction.rings import find_rings, ring_line
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.forms import Form, PieceRecipe
@@ -198,11 +197,13 @@ def sized_opening(form: FormResult, opening: Opening, positions: Mapping[str, Fl
     return replace(opening, length=length, share=0.0)
 
 
-def one_sided(openings: Sequence[Opening]) -> bool:
-    """Return whether some seam of one side of the body has an opening that its mirror image has not."""
-    both_sides = {replace(opening, line=re.sub(r"\b(left|right)\b", "side", opening.line)) for opening in openings}
-    sided = [opening for opening in openings if re.search(r"\b(left|right)\b", opening.line)]
-    return 2 * len([opening for opening in both_sides if opening not in openings]) != len(set(sided))
+def one_sided(openings: Sequence[Opening]) -> list[Opening]:
+    """Return the openings for which pieces of one side of the body are cut unlike their mirror images.
+
+    A zip is none: it is sewn into edges that are cut alike with and without it.
+    """
+    cut = [opening for opening in openings if opening.kind != "zip" and without_side(opening.line) != opening.line]
+    return [opening for opening in cut if replace(opening, line=other_side(opening.line)) not in cut]
 
 
 def opened_rings(

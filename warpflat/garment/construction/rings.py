@@ -110,7 +110,9 @@ def measure_rings(
         name = ring_line(mannequin, ring)
         # Two edges at one line are told apart: the first is the longer one.
         edges[find_unused_name(name, edges)] = length
-    lengths = {name: girth["pattern_m"] for name, girth in girths.items()} | edges
+    # Neck and armholes are passed where they are edges.
+    within = {name: girth["pattern_m"] for name, girth in girths.items() if not name.startswith(("neck", "armhole"))}
+    lengths = within | edges
     limbs = {_line_of(name).partition(" ")[0] for name in edges if " " in _line_of(name)}
     over_head = any(_line_of(name).startswith(("neck", "armhole")) for name in edges) and not limbs & set(
         LEG_LINES.values()

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from warpflat.garment.mannequin.forms import FormResult
     from warpflat.garment.mannequin.layout import Layout
 
-__all__ = ["UPRIGHT", "PieceEdges", "RowEdges", "Tape", "stretch_tape"]
+__all__ = ["ALONG", "UPRIGHT", "PieceEdges", "RowEdges", "Tape", "stretch_tape"]
 
-#: The axis of the trunk.
-UPRIGHT = np.array([0.0, 1.0, 0.0])
+#: The axis of the trunk, and that of a tape which follows its line wherever that rises.
+UPRIGHT, ALONG = np.array([0.0, 1.0, 0.0]), np.zeros(3)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,7 +70,7 @@ class PieceEdges:
 
         Args:
             row: vertices of the grid, the first not repeated.
-            axis: unit vector that tapes are level to.
+            axis: unit vector that tapes are level to, or :data:`ALONG`.
         """
         edges = np.column_stack([row, np.roll(row, -1)])
         side = self._form.vertices[edges[:, 1]] - self._form.vertices[edges[:, 0]]

@@ -49,7 +49,7 @@ from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.form_plan import EdgePlan, check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.construction.line_drawing import describe_worn
 from warpflat.garment.construction.mark_openings import mark_openings
-from warpflat.garment.construction.mirror_pieces import MirrorPair, find_mirror_pairs, sew_mirror_pairs
+from warpflat.garment.construction.mirror_pieces import MirrorPair, evened, find_mirror_pairs, sew_mirror_pairs
 from warpflat.garment.construction.openings import one_sided, place_opening
 from warpflat.garment.construction.pockets import add_pockets
 from warpflat.garment.construction.strips import CLOTH_WIDTH
@@ -188,14 +188,14 @@ def pattern_of_garment(
     plans = {size: plan_form(each, rules) for size, each in forms.items()}
     plan = next(iter(plans.values()))
     # Relaxation keeps a piece upright, but not in its place: the lower ends of its datum lie on each other in all sizes.
-    laid = {}
+    laid, evened_sample = {}, evened(sample)
     for size, garment in garments.items():
-        moved = {}
-        for piece, flat in garment.pieces.items():
-            there = sample.pieces[piece]
+        moved, even = {}, evened(garment)
+        for piece, flat in even.pieces.items():
+            there = evened_sample.pieces[piece]
             offset = there.positions[there.datum[0]] - flat.positions[flat.datum[0]]
             moved[piece] = replace(flat, positions=np.round(flat.positions + offset, _DECIMALS))
-        laid[size] = replace(garment, pieces=moved)
+        laid[size] = replace(even, pieces=moved)
     garments, sample = laid, next(iter(laid.values()))
     # Half pieces whose fold strays from straight in some size, and by how much [m] at most.
     bent: dict[str, float] = {}
@@ -237,19 +237,28 @@ def pattern_of_garment(
     ):
         side = (SeamSide(piece=piece, edge=edge),)
         seams = (*seams, Seam(name=find_unused_name(title, {seam.name for seam in seams}), sides=(side, side)))
-    # One pattern cannot serve for both sides where just one of them has an opening, or a hem slants to one side.
-    apart = one_sided(sample.openings) or any(wish.is_one_sided for wish in sample.finishing)
-    pairs = () if apart else find_mirror_pairs(garments, pieces, seams)
+    placed = {
+        size: [place_opening(forms[size], opening, garment.positions) for opening in garment.openings]
+        for size, garment in garments.items()
+    }
+    # One pattern cannot serve for both sides where an opening is cut into just one of them, or a hem slants to one side.
+    cut = one_sided(sample.openings)
+    parted = {
+        part.seam
+        for opening, parts in zip(sample.openings, placed[next(iter(garments))], strict=True)
+        for part in parts
+        if opening in cut
+    }
+    unlike = {side.piece for seam in seams if seam.name in parted for row in seam.sides for side in row}
+    slanted = {wish.edge for wish in sample.finishing if wish.is_one_sided}
+    unlike |= {piece.name for piece in pieces[next(iter(pieces))] for edge in piece.edges if edge.name in slanted}
+    pairs = find_mirror_pairs(garments, pieces, seams, unlike)
     drawn, notes = _drawn_once(pieces, pairs)
     notes += tuple(
         f"{piece}: {opened[piece]} bends by {stray * 1000:.1f} mm and cannot lie on the fold: cut twice, with a seam there"
         for piece, stray in bent.items()
     )
     pattern = Pattern(name=name, pieces=drawn, seams=sew_mirror_pairs(seams, pairs), sample_size=sample_size)
-    placed = {
-        size: [place_opening(forms[size], opening, garment.positions) for opening in garment.openings]
-        for size, garment in garments.items()
-    }
     pattern = mark_openings(pattern, sample.openings, placed)
     zips = [
         row[0].seam for row, each in zip(placed[pattern.sample], sample.openings, strict=True) if each.opens_the_top

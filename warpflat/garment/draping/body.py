@@ -9,11 +9,9 @@ from warpflat.core import FloatArray, IntArray, launch_each
 from warpflat.flat import triangulate, vertex_normals
 from warpflat.kernels.drape_contact import find_planes
 
-__all__ = ["SKIN", "Body"]
+__all__ = ["Body"]
 
 _FAR = 1e3  # [m]
-#: Its colour in pictures and films, sRGB.
-SKIN = (0.80, 0.79, 0.77)
 # It is drawn this much smaller [m], so that cloth that lies on it is seen.
 _SHRUNK = 0.003
 

@@ -243,7 +243,7 @@ def place_drafted(
     placed |= hang_from_edges(placed, meshes, welds, falling)
     placed = _continued(placed, pieces, meshes, welds, body)
     cloth = _cloth(pieces, meshes, welds, placed, fabric, turned)
-    cloth = _sewn_to(cloth, {*meshes} - {*drafted} | {*falling}, solid)
+    cloth = _sewn_to(cloth, {*meshes} - {*drafted} | {*falling}, _dressed(solid, meshes, placed, whole))
     for name in drafted:
         title = next(each.name for each in given if name == each.name or name.startswith(each.name + " "))
         points = cloth.designed[cloth.welded[cloth.piece_vertices[name]]]
@@ -272,6 +272,21 @@ def _surface(name: str, points: FloatArray, triangles: IntArray) -> Surface:
         vertices=points, faces=np.column_stack([triangles, np.full(len(triangles), -1)]).astype(np.int32), name=name,
         input_vertices=points, input_index=np.arange(len(points), dtype=np.int32),
     )  # fmt: skip
+
+
+def _dressed(
+    body: Body, meshes: Mapping[str, FlatMesh], placed: Mapping[str, FloatArray], worn: Collection[str]
+) -> Body:
+    """Return a body with pieces that it wears: a collar that is turned down lies on these."""
+    vertices, faces = [body.vertices], [body.triangles]
+    for name in (name for name in meshes if name in worn):
+        triangles, count = meshes[name].triangles, sum(map(len, vertices))
+        outward = float((vertex_normals(placed[name], triangles) * body.nearest(placed[name])[1]).sum())
+        faces.append(count + (triangles if outward > 0.0 else triangles[:, ::-1]))
+        vertices.append(placed[name])
+    triangles = np.concatenate(faces)
+    none = np.full((len(triangles), 1), -1)
+    return Body(np.concatenate(vertices), np.hstack([triangles, none]).astype(np.int32), device=body.device)
 
 
 def _sewn_to(cloth: SewnCloth, stay: Collection[str], body: Body) -> SewnCloth:

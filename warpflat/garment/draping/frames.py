@@ -5,42 +5,47 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import FloatArray, IntArray, latest_file, weighted_percentile
-from warpflat.flat import area_vectors, mean_normals, triangulate
-from warpflat.garment.draping.body import SKIN
+from warpflat.core import FloatArray, latest_file
 from warpflat.garment.draping.result import Drape
 from warpflat.pattern import (
-    Lighting,
+    ENERGY,
+    PIXELS_AROUND,
+    SIDES,
+    SKIN,
+    Body,
+    Scale,
+    Shot,
     begin_stage,
     corner_mean,
     define_group,
     define_mesh,
-    energy_colours,
+    dress,
     export_stage,
     last_values_as_defaults,
     linear_rgb,
+    on_paper,
     part_path,
-    rasterise,
     set_face_map,
     set_points,
-    shade,
     usd_errors,
+    view_from_side,
     write_moving_picture,
 )
 
 __all__ = ["choose_frames", "write_drape_film", "write_drape_frames"]
 
 _COUNT = 30
-_RATE, _HEIGHT, _PAPER, _MARGIN = 12, 420, 249, 8
+_RATE, _HEIGHT = 12, 420
 # Room between the worn garment and the surfaces beside it [m].
 _BESIDE = 0.3
 
 
+# The least upper end of the scale of gaps [m].
+_LEAST_GAP = 0.005
 # Way from one frame to the next below which nothing is seen to move [m].
 _SEEN = 1e-4
 
@@ -103,12 +108,12 @@ def write_drape_frames(path: Path, drape: Drape) -> None:
         body.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set([Gf.Vec3f(*linear_rgb(SKIN).tolist())])
         cloth = define_mesh(stage, "/World/drape/cloth", drape.cloth.faces)
         colours = cloth.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
-        widest = _widest(drape)
-        colours.GetAttr().SetCustomData({"quantity": "gap", "unit": "m", "rangeMin": 0.0, "rangeMax": widest})
+        scale = Scale.from_zero(drape.gap, drape.areas, _LEAST_GAP, ENERGY)
+        colours.GetAttr().SetCustomData({"quantity": "gap", "unit": "m", "rangeMin": 0.0, "rangeMax": scale.high})
         for time, number in enumerate(chosen, start=begin):
             points = drape.frames[number].astype(np.float64)
             set_points(cloth, points, Usd.TimeCode(time))
-            found = linear_rgb(energy_colours(drape.body.gaps(points), widest)).astype(np.float32)
+            found = linear_rgb(scale.rgb(drape.body.gaps(points))).astype(np.float32)
             colours.GetAttr().Set(Vt.Vec3fArray.FromNumpy(found), Usd.TimeCode(time))
         last_values_as_defaults(stage, [cloth.GetPrim()])
         # On the patterns the gap is now that of the worn cloth.
@@ -122,11 +127,6 @@ def write_drape_frames(path: Path, drape: Drape) -> None:
     export_stage(stage, path)
 
 
-def _widest(drape: Drape) -> float:
-    """Return the upper end of the scale of gaps [m]."""
-    return max(0.005, weighted_percentile(drape.gap, drape.areas, 0.98))
-
-
 def write_drape_film(path: Path, drape: Drape) -> None:
     """Draw the frames from the front, the left and the back as a moving picture, coloured by the gap to the body.
 
@@ -135,50 +135,26 @@ def write_drape_film(path: Path, drape: Drape) -> None:
     """
     from PIL import Image
 
-    body, widest = drape.body, _widest(drape)
-    inner = body.shrunk
-    cloth, _ = triangulate(drape.cloth.faces)
-    everything = np.concatenate(drape.frames)
-    low, high = everything.min(axis=0) - 0.1, everything.max(axis=0) + 0.1
-    near = ((inner > low) & (inner < high)).all(axis=1)
-    skin = body.triangles[near[body.triangles].all(axis=1)]
-    pictures = []
+    scale = Scale.from_zero(drape.gap, drape.areas, _LEAST_GAP, ENERGY)
+    first, everything = (rows.astype(np.float64) for rows in (drape.frames[0], np.concatenate(drape.frames)))
+    body = Body(vertices=drape.body.shrunk, faces=drape.body.triangles)
+    dressed, facets, count = dress(body, first, drape.cloth.faces, room=everything)
+    inner = dressed[len(first) :]
+    # All frames show the same room, as high as the picture.
+    shown = np.concatenate([everything, dressed[facets.used]])
+    per_metre = (_HEIGHT - 2 * PIXELS_AROUND) / float(np.ptp(shown[:, 1]))
+    rooms = dict[float, FloatArray]()
+    for _, degrees in SIDES:
+        rooms[degrees] = shown @ view_from_side(dressed, facets, degrees).directions.T
+    skin, pictures = np.tile(SKIN, (count, 1)), []
     for number in choose_frames(drape.frames):
         points = drape.frames[number].astype(np.float64)
-        gap = drape.body.gaps(points)[cloth].mean(axis=1)
-        colours = np.concatenate([energy_colours(gap, widest), np.tile(SKIN, (len(skin), 1))])
-        joined = np.concatenate([points, inner]), np.concatenate([cloth, skin + len(points)]).astype(np.int32)
-        views = [_view(*joined, colours, (low, high), degrees) for degrees in (0.0, 90.0, 180.0)]
-        pictures.append(Image.fromarray(np.concatenate(views, axis=1)))
+        colours = np.concatenate([scale.rgb(corner_mean(drape.body.gaps(points), drape.cloth.faces)), skin])
+        sides = []
+        for degrees, room in rooms.items():
+            view = view_from_side(np.concatenate([points, inner]), facets, degrees)
+            shot = Shot(view, per_metre, low=room.min(axis=0), size=np.ptp(room, axis=0))
+            sides.append(on_paper(shot.pixels(colours)))
+        pictures.append(Image.fromarray(np.concatenate(sides, axis=1)))
     durations = [1000 // _RATE] * (len(pictures) - 1) + [2000]
     write_moving_picture(path, pictures, durations)
-
-
-def _view(
-    points: FloatArray, triangles: IntArray, colours: FloatArray, box: tuple[FloatArray, FloatArray], degrees: float
-) -> Any:
-    """Return a picture of a mesh as seen by somebody who walked `degrees` around it to its left, RGB."""
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    turn = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
-    corners = np.array(
-        [[x, y, z] for x in (box[0][0], box[1][0]) for y in (box[0][1], box[1][1]) for z in (box[0][2], box[1][2])]
-    )
-    turned, frame = points @ turn.T, corners @ turn.T
-    low, size = frame.min(axis=0), np.ptp(frame, axis=0)
-    scale = (_HEIGHT - 2 * _MARGIN) / float(size[1])
-    wide = int(2 * np.ceil((float(size[0]) * scale + 2 * _MARGIN) / 2))
-    grid = np.column_stack([
-        2.0 * ((turned[:, 0] - low[0]) * scale + _MARGIN),
-        2.0 * (_HEIGHT - (turned[:, 1] - low[1]) * scale - _MARGIN),
-        turned[:, 2],
-    ])  # fmt: skip
-    samples = rasterise(grid, triangles, (2 * _HEIGHT, 2 * wide))
-    vectors = area_vectors(turned, triangles)
-    lighting = Lighting(
-        normals=mean_normals(vectors, triangles, len(points)), direction=(-0.3, 0.5, 1.0), back=(0.6, 0.6, 0.6)
-    )
-    pixels = shade(
-        samples, 2, grid, triangles, colours, face=np.arange(len(triangles), dtype=np.int32), lighting=lighting
-    )
-    cover = pixels[..., 3:] / 255.0
-    return np.round(_PAPER * (1.0 - cover) + pixels[..., :3] * cover).astype(np.uint8)

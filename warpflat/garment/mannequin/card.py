@@ -8,12 +8,12 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.patches import Circle
 
 from warpflat.core import IntArray
 from warpflat.garment.mannequin.bricks import TRUNK_LEVELS
 from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS
-from warpflat.pattern import GREY, DrawnView, Pen, all_letters, make_facets, new_figure, view_from_side, write_figure
+from warpflat.garment.mannequin.picture import body_views
+from warpflat.pattern import GREY, SKIN, draw_row, drawn_page
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.mannequin import Mannequin
@@ -57,7 +57,7 @@ _LINES = {
 }  # fmt: skip
 _BEHIND = ("back_width", "armscye_depth", "nape_to_waist")
 _PAGE = (8.27, 11.69)  # [in], A4
-_BODY, _LINE = (0.93, 0.90, 0.84), "#9c1f30"
+_LINE = "#9c1f30"
 _HEIGHT, _TOP = 5.0, 10.75  # of the figures, and where they begin [in]
 
 
@@ -99,7 +99,6 @@ def needed_measurements(bands: Collection[tuple[str, str]], *, hood: bool = Fals
     return [name for name in _HOW if name in found]
 
 
-@all_letters()
 def write_measurement_card(
     path: str | os.PathLike[str],
     mannequin: Mannequin,
@@ -122,52 +121,49 @@ def write_measurement_card(
     Raises:
         InputError: the file cannot be written.
     """
-    figure = new_figure(*_PAGE)
-    pen = Pen(figure)
-    pen.open_page()
-    pen.write(0.5, 11.3, title, 15, fontweight="bold")
-    pen.write(0.5, 11.03, "Measure over underwear, the tape snug and level, standing upright.", 9.5, color=GREY)
-    number = {name: k for k, name in enumerate(needed, start=1)}
-    faces = mannequin.layout.body_faces
-    facets = make_facets(faces, np.empty((0, 2), dtype=np.int32))
-    for middle, degrees, names in (
-        (2.20, 0.0, [name for name in needed if name not in _BEHIND]),
-        (6.07, 180.0, [name for name in needed if name in _BEHIND]),
-    ):
-        view = view_from_side(mannequin.vertices, facets, degrees)
-        scale = _HEIGHT / float(view.size[1])
-        drawn = DrawnView(
-            view, left=middle - 0.5 * float(view.size[0]) * scale, bottom=_TOP - _HEIGHT, inches_per_metre=scale
+    with drawn_page(path, *_PAGE) as pen:
+        pen.write(0.5, 11.3, title, 15, fontweight="bold")
+        pen.write(0.5, 11.03, "Measure over underwear, the tape snug and level, standing upright.", 9.5, color=GREY)
+        number = {name: k for k, name in enumerate(needed, start=1)}
+        views, shades = (
+            body_views(mannequin, (("", 0.0), (" ", 180.0))),
+            np.tile(SKIN, (len(mannequin.layout.body_faces), 1)),
         )
-        drawn.draw(pen.axes, np.tile(_BODY, (len(faces), 1)))
-        tapes = {name: drawn.to_page(view.points[ids]) for name in names if (ids := _tape(mannequin, name)) is not None}
-        for line in tapes.values():
-            pen.line(line, width=1.6, colour=_LINE, halo=True)
-        for name, line in tapes.items():
-            # A number lies on its tape: in the middle of a girth, half-way along a length.
-            closed = np.allclose(line[0], line[-1])
-            x, y = (line.min(axis=0) + line.max(axis=0)) / 2 if closed else line[len(line) // 2]
-            badge = Circle((float(x), float(y)), 0.10, facecolor="white", edgecolor=_LINE, linewidth=0.9, zorder=7)
-            pen.axes.add_patch(badge)
-            pen.write(float(x), float(y) - 0.01, str(number[name]), 8, fontweight="bold", color=_LINE, ha="center")
-    row = min(0.27, 5.1 / max(len(number), 1))
-    y = _TOP - _HEIGHT - 0.35
-    for name, k in number.items():
-        pen.write(0.62, y, str(k), 9.5, fontweight="bold", color=_LINE, ha="right")
-        pen.write(0.74, y, name.replace("_", " "), 9.5, fontweight="bold")
-        words = textwrap.shorten(_HOW[name], 86, placeholder=" …")
-        pen.write(1.95, y, words, 8.2, color=GREY)
-        if values is not None and name in values:
-            guess = " (guess)" if name in guessed else ""
-            pen.write(_PAGE[0] - 0.45, y, f"{100 * values[name]:.1f} cm{guess}", 9.5, ha="right")
-        else:
-            pen.line(np.array([(_PAGE[0] - 1.35, y - 0.08), (_PAGE[0] - 0.75, y - 0.08)]), width=0.7, colour=GREY)
-            pen.write(_PAGE[0] - 0.45, y, "cm", 9.5, ha="right")
-        y -= row
-    if guessed and values:
-        words = "A guess follows from the others by the size table: measure it yourself where you can."
-        pen.write(0.5, 0.28, words, 8.5, color=GREY, fontstyle="italic")
-    write_figure(path, figure)
+        wide, high = views[""].size[:2].tolist()
+        scale = _HEIGHT / high
+        gap = 0.5 * _PAGE[0] - wide * scale
+        bodies = draw_row(
+            pen, views, [shades] * 2, left=0.5 * gap, bottom=_TOP - _HEIGHT, inches_per_metre=scale, gap=gap
+        )
+        for drawn, is_behind in zip(bodies, (False, True), strict=True):
+            view, names = drawn.view, [name for name in needed if (name in _BEHIND) is is_behind]
+            tapes = {
+                name: drawn.to_page(view.points[ids]) for name in names if (ids := _tape(mannequin, name)) is not None
+            }
+            for line in tapes.values():
+                pen.line(line, width=1.6, colour=_LINE, halo=True)
+            for name, line in tapes.items():
+                # A number lies on its tape: in the middle of a girth, half-way along a length.
+                closed = np.allclose(line[0], line[-1])
+                x, y = (line.min(axis=0) + line.max(axis=0)) / 2 if closed else line[len(line) // 2]
+                pen.badge(float(x), float(y), str(number[name]), _LINE)
+        row = min(0.27, 5.1 / max(len(number), 1))
+        y = _TOP - _HEIGHT - 0.35
+        for name, k in number.items():
+            pen.write(0.62, y, str(k), 9.5, fontweight="bold", color=_LINE, ha="right")
+            pen.write(0.74, y, name.replace("_", " "), 9.5, fontweight="bold")
+            words = textwrap.shorten(_HOW[name], 86, placeholder=" …")
+            pen.write(1.95, y, words, 8.2, color=GREY)
+            if values is not None and name in values:
+                guess = " (guess)" if name in guessed else ""
+                pen.write(_PAGE[0] - 0.45, y, f"{100 * values[name]:.1f} cm{guess}", 9.5, ha="right")
+            else:
+                pen.line(np.array([(_PAGE[0] - 1.35, y - 0.08), (_PAGE[0] - 0.75, y - 0.08)]), width=0.7, colour=GREY)
+                pen.write(_PAGE[0] - 0.45, y, "cm", 9.5, ha="right")
+            y -= row
+        if guessed and values:
+            words = "A guess follows from the others by the size table: measure it yourself where you can."
+            pen.write(0.5, 0.28, words, 8.5, color=GREY, fontstyle="italic")
 
 
 def _tape(mannequin: Mannequin, name: str) -> IntArray | None:

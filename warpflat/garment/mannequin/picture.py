@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 
 from warpflat.core import FloatArray
 from warpflat.flat import vertex_normals
@@ -17,31 +15,38 @@ from warpflat.garment.mannequin.layout import LEG_LINES, RING_LEVELS
 from warpflat.pattern import (
     INK,
     SIDES,
+    SKIN,
     DrawnView,
     Pen,
-    all_letters,
+    Scale,
+    View,
+    draw_row,
+    drawn_page,
     make_facets,
-    new_figure,
     space_out,
     view_from_side,
-    write_figure,
 )
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.mannequin import Mannequin
 
-__all__ = ["signed_distances", "write_distance_picture", "write_mannequin_picture"]
+__all__ = ["body_views", "signed_distances", "write_distance_picture", "write_mannequin_picture"]
 
 _VIEWS = (("front", 0.0), ("three-quarter", 38.0), ("left side", 90.0), ("back", 180.0))
-_HEIGHT = 8.0  # [in]
-_BODY, _LINE, _LEADER = (0.93, 0.90, 0.84), "#9c1f30", (*INK, 0.65)
+_HEIGHT, _GAP = 8.0, 0.2  # of the page, and between views [in]
+_LINE, _LEADER = "#9c1f30", (*INK, 0.65)
 # A line is not drawn where it turns from the eye: there it slips along the outline.
 _FACING = 0.12
 # Ends of the scale of distances [mm]; what lies farther has the colour of the ends.
 _SCALE = 15.0
 
 
-@all_letters()
+def body_views(mannequin: Mannequin, sides: Iterable[tuple[str, float]]) -> dict[str, View]:
+    """Return views of a mannequin without its mesh by title, from some sides [degrees]."""
+    facets = make_facets(mannequin.layout.body_faces, np.empty((0, 2), dtype=np.int32))
+    return {title: view_from_side(mannequin.vertices, facets, degrees) for title, degrees in sides}
+
+
 def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) -> None:
     """Draw the mannequin from front, three-quarter, side and back, with profiles and lines by name and girth in cm.
 
@@ -49,47 +54,47 @@ def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) 
         InputError: if the file cannot be written.
     """
     faces = mannequin.layout.body_faces
-    facets = make_facets(faces, np.empty((0, 2), dtype=np.int32))
-    views = [(title, view_from_side(mannequin.vertices, facets, angle)) for title, angle in _VIEWS]
-    span = float(views[0][1].size[1])
+    views = body_views(mannequin, _VIEWS)
+    span = float(views["front"].size[1])
     # The side view keeps room for the profiles' names behind it.
-    widths = [0.62 * span if title == "left side" else 1.03 * float(view.size[0]) for title, view in views]
+    widths = [0.62 * span if title == "left side" else 1.03 * float(view.size[0]) for title, view in views.items()]
     scale = _HEIGHT * 0.92 / (1.06 * span)
-    figure = new_figure(sum(widths) * scale, _HEIGHT)
-    pen = Pen(figure)
-    pen.open_page()
-    left = 0.0
-    for (title, view), width in zip(views, widths, strict=True):
-        middle = left + (0.5 * width - (0.11 * span if title == "left side" else 0.0)) * scale
-        left += width * scale
-        corner = middle - 0.5 * float(view.size[0]) * scale
-        drawn = DrawnView(view, left=corner, bottom=0.01 * _HEIGHT + 0.02 * span * scale, inches_per_metre=scale)
-        drawn.draw(pen.axes, np.tile(_BODY, (len(faces), 1)))
-        towards = vertex_normals(view.points, faces)[:, 2] > _FACING
-        for ids in mannequin.layout.body_lines.values():
-            edges = np.column_stack([ids[:-1], ids[1:]])
-            drawn.draw_segments(pen.axes, edges[towards[edges].all(axis=1)], width=0.9, colour=_LINE, zorder=5)
-        if title == "left side":
-            # Names and girths [cm] of the profiles stand behind the side view, on short leaders, spread so that none overlap.
-            levels = mannequin.levels()
-            trunk = RING_LEVELS[RING_LEVELS.index("hip") :]
-            names = ["neck", "chest back", *reversed(trunk), *(f"{line} left" for line in LEG_LINES.values())]
-            height = drawn.box[3] - drawn.box[1]
-            ends = []
-            for name in names:
-                line = drawn.to_page(drawn.view.points[mannequin.layout.lines[name]])
-                ends.append(line[int(np.argmax(line[:, 0]))])
-            places = space_out([float(end[1]) for end in ends], 0.028 * height, drawn.box[1], drawn.box[3])
-            x = middle + 0.17 * height
-            for name, end, y in zip(names, ends, places, strict=True):
-                shown = {"neck": "neck base", "chest back": "across back"}.get(name, name)
-                pen.line(np.array([(float(end[0]) + 0.03, float(end[1])), (x - 0.06, y)]), width=0.5, colour=_LEADER)
-                pen.write(x, y, f"{shown} {levels[name].girth * 100:.1f} cm", 8)
-        else:
-            _label_lines(pen, drawn, mannequin, title)
-        pen.write(middle, drawn.box[3] + 0.03 * span * scale, title, 11, ha="center")
-    pen.write(0.5 * pen.page_width, 0.98 * _HEIGHT, f"Mannequin: {mannequin.source}", 12, ha="center")
-    write_figure(path, figure)
+    with drawn_page(path, sum(widths) * scale, _HEIGHT) as pen:
+        left = 0.0
+        for (title, view), width in zip(views.items(), widths, strict=True):
+            middle = left + (0.5 * width - (0.11 * span if title == "left side" else 0.0)) * scale
+            left += width * scale
+            corner = middle - 0.5 * float(view.size[0]) * scale
+            drawn = DrawnView(
+                pen, view, left=corner, bottom=0.01 * _HEIGHT + 0.02 * span * scale, inches_per_metre=scale
+            )
+            drawn.draw(np.tile(SKIN, (len(faces), 1)))
+            towards = vertex_normals(view.points, faces)[:, 2] > _FACING
+            for ids in mannequin.layout.body_lines.values():
+                edges = np.column_stack([ids[:-1], ids[1:]])
+                drawn.draw_segments(edges[towards[edges].all(axis=1)], width=0.9, colour=_LINE)
+            if title == "left side":
+                # Names and girths [cm] of the profiles stand behind the side view, on short leaders, spread so that none overlap.
+                levels = mannequin.levels()
+                trunk = RING_LEVELS[RING_LEVELS.index("hip") :]
+                names = ["neck", "chest back", *reversed(trunk), *(f"{line} left" for line in LEG_LINES.values())]
+                height = drawn.box[3] - drawn.box[1]
+                ends = []
+                for name in names:
+                    line = drawn.to_page(drawn.view.points[mannequin.layout.lines[name]])
+                    ends.append(line[int(np.argmax(line[:, 0]))])
+                places = space_out([float(end[1]) for end in ends], 0.028 * height, drawn.box[1], drawn.box[3])
+                x = middle + 0.17 * height
+                for name, end, y in zip(names, ends, places, strict=True):
+                    shown = {"neck": "neck base", "chest back": "across back"}.get(name, name)
+                    pen.line(
+                        np.array([(float(end[0]) + 0.03, float(end[1])), (x - 0.06, y)]), width=0.5, colour=_LEADER
+                    )
+                    pen.write(x, y, f"{shown} {levels[name].girth * 100:.1f} cm", 8)
+            else:
+                _label_lines(pen, drawn, mannequin, title)
+            pen.write(middle, drawn.box[3] + 0.03 * span * scale, title, 11, ha="center")
+        pen.write(0.5 * pen.width, 0.98 * _HEIGHT, f"Mannequin: {mannequin.source}", 12, ha="center")
 
 
 def _label_lines(pen: Pen, drawn: DrawnView, mannequin: Mannequin, view: str) -> None:
@@ -141,35 +146,22 @@ def signed_distances(mannequin: Mannequin) -> FloatArray:
     return np.asarray(distance * np.sign(turn * np.einsum("nd,nd->n", middles - place, normals[triangle])))
 
 
-@all_letters()
 def write_distance_picture(mannequin: Mannequin, path: str | os.PathLike[str]) -> None:
     """Draw the mannequin from front, side and back in the colours of its distance to the scan, with a scale in mm.
 
     Raises:
         InputError: if the file cannot be written.
     """
-    faces, distance = mannequin.layout.body_faces, 1000.0 * signed_distances(mannequin)
-    scale = ScalarMappable(Normalize(-_SCALE, _SCALE), colormaps["RdBu"])
-    facets = make_facets(faces, np.empty((0, 2), dtype=np.int32))
-    views = [(title, view_from_side(mannequin.vertices, facets, angle)) for title, angle in SIDES]
-    inches = _HEIGHT * 0.82 / float(views[0][1].size[1])
-    figure = new_figure(inches * sum(1.05 * float(view.size[0]) for _, view in views), _HEIGHT)
-    pen = Pen(figure)
-    pen.open_page()
-    left, colours = 0.0, scale.to_rgba(distance)[:, :3]
-    for title, view in views:
-        wide = inches * float(view.size[0])
-        drawn = DrawnView(view, left=left + 0.025 * wide, bottom=0.11 * _HEIGHT, inches_per_metre=inches)
-        drawn.draw(pen.axes, colours)
-        pen.write(left + 0.525 * wide, drawn.box[3] + 0.12, title, 10, ha="center")
-        left += 1.05 * wide
-    bar = figure.colorbar(
-        scale, cax=figure.add_axes((0.25, 0.055, 0.5, 0.018)), orientation="horizontal", extend="both"
-    )
-    far = np.abs(distance)
-    bar.set_label(
-        f"mannequin inside (-) or outside (+) the scan [mm]; half of it within {np.median(far):.1f} mm, 95 % within "
-        f"{np.quantile(far, 0.95):.1f} mm", fontsize=9,
-    )  # fmt: skip
-    pen.write(0.5 * pen.page_width, 0.98 * _HEIGHT, f"Distance to the {mannequin.source}", 11, ha="center")
-    write_figure(path, figure)
+    distance = 1000.0 * signed_distances(mannequin)
+    scale, far = Scale(low=-_SCALE, high=_SCALE, colours="RdBu"), np.abs(distance)
+    views = body_views(mannequin, SIDES)
+    inches = _HEIGHT * 0.82 / float(views["front"].size[1])
+    with drawn_page(path, inches * sum(float(view.size[0]) for view in views.values()) + 3 * _GAP, _HEIGHT) as pen:
+        colours, left = [scale.rgb(distance)] * len(views), 0.5 * _GAP
+        draw_row(pen, views, colours, left=left, bottom=0.11 * _HEIGHT, inches_per_metre=inches, gap=_GAP)
+        bar = pen.colour_bar(scale, 0.25 * pen.width, 0.055 * _HEIGHT, 0.5 * pen.width, 0.018 * _HEIGHT)
+        bar.set_label(
+            f"mannequin inside (-) or outside (+) the scan [mm]; half of it within {np.median(far):.1f} mm, 95 % within "
+            f"{np.quantile(far, 0.95):.1f} mm", fontsize=9,
+        )  # fmt: skip
+        pen.write(0.5 * pen.width, 0.98 * _HEIGHT, f"Distance to the {mannequin.source}", 11, ha="center")

@@ -32,6 +32,7 @@ from warpflat.pattern.drafting.drafted_darts import (
     smooth_fisheye,
 )
 from warpflat.pattern.drafting.fitting import (
+    ALIKE,
     TOLERANCES,
     as_in_layout,
     equal_sides,
@@ -279,7 +280,8 @@ def _frame(piece: Piece) -> FloatArray:
         length = float(np.linalg.norm(span))
         if edge.kind != "fold" and (abs(span[0]) > ALONG_GRAIN * length or edge.length > length * 1.0001):
             continue
-        if edge.kind == "fold" or length > longest:
+        # Of edges that are equally long the first, whatever the rounding.
+        if edge.kind == "fold" or length > longest + ALIKE:
             anchor, longest = ends[np.argmin(ends[:, 1])], length
             if edge.kind == "fold":
                 break

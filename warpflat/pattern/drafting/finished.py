@@ -19,7 +19,7 @@ _AT_END = 0.02
 _LINES = {
     "centre back": "length at the centre back",
     "overarm": "sleeve",
-    "outseam": "outer leg, below the waistband",
+    "outseam": "outer leg",
     "inseam": "inner leg",
 }
 
@@ -32,24 +32,38 @@ def finished_lengths(garment: DraftedGarment, size: str) -> dict[str, float]:
     drafted = {piece.name: piece for piece in garment.pieces[size]}
     pieces = [piece for piece in drafted.values() if piece.piece.role == "shell" and not is_flounce(piece.piece)]
     legs = any(_called(seam.name) == "inseam" for seam in garment.seams)
+    banded = any(piece.piece.role == "waistband" for piece in drafted.values())
     found: dict[str, float] = {}
     for line, words in _LINES.items():
         # Along pieces that lie below each other; left and right, and front and back of a leg or sleeve, are one length.
         lengths: dict[str, float] = {}
-        ends = False
+        ends, beside = False, set[str]()
         for piece in pieces:
             stretches = [edge.line for edge in piece.edges if _called(edge.name) == line]
-            stretches += [points for name, points in piece.internal_lines.items() if _called(name) == line]
+            within = [(_called(name), points) for name, points in piece.internal_lines.items()]
+            # Inside a piece the line of a leg is another one above the hip.
+            above = [points[::-1] for name, points in within if line == "outseam" and name == "side"]
+            stretches += [np.concatenate([*above, points]) for name, points in within if name == line]
             if stretches:
+                beside.update(_called(edge.name) for edge in piece.edges)
                 sums = [polyline_length(points) for points in stretches]
                 key = without_side(piece.name) if line == "centre back" else line
                 length = sum(sums) if line == "centre back" else max(sums)
-                more = _goes_on(garment, drafted, piece, np.concatenate(stretches))
+                points = np.concatenate(stretches)
+                more = _band_at(garment, drafted, piece, points[points[:, 1].argmin()]) or 0.0
+                banded = banded or _band_at(garment, drafted, piece, points[points[:, 1].argmax()]) is not None
                 lengths[key] = max(length + more, lengths.get(key, 0.0))
                 ends = ends or more > 0.0 or any(edge.kind == "hem" for edge in piece.edges)
         for seam in garment.seams:
             if seam.size == size and _called(seam.name) == line != "centre back":
                 lengths[line] = max(1e-3 * max(seam.length_mm), lengths.get(line, 0.0))
+        if line == "inseam" and "thigh" in beside:
+            # It ends where legs begin.
+            continue
+        if line == "outseam" and "armhole" in beside:
+            words = "side, below the armhole"
+        elif line == "outseam" and banded:
+            words = "outer leg, below the waistband"
         if lengths and (ends or line in ("outseam", "inseam")) and not (legs and line == "centre back"):
             found[translate(words)] = sum(lengths.values())
     hems: dict[str, float] = {}
@@ -68,25 +82,24 @@ def finished_lengths(garment: DraftedGarment, size: str) -> dict[str, float]:
     return found
 
 
-def _goes_on(
-    garment: DraftedGarment, drafted: Mapping[str, DraftedPiece], piece: DraftedPiece, line: FloatArray
-) -> float:
-    """Return by how much a cuff, a band or a flounce lengthens a piece at the lower end of a line on it (#P by 2) [m]."""
+def _band_at(
+    garment: DraftedGarment, drafted: Mapping[str, DraftedPiece], piece: DraftedPiece, end: FloatArray
+) -> float | None:
+    """Return the width [m] of a cuff, a band or a flounce that is sewn to a piece at one of its points; None if there is none."""
     import shapely
 
-    end = shapely.Point(line[line[:, 1].argmin()])
     for seam in garment.garment.seams:
         for own, other in (seam.sides, seam.sides[::-1]):
-            below = drafted[other[0].piece].piece
-            if below.role not in ("strip", "cuff") and not is_flounce(below):
+            band = drafted[other[0].piece].piece
+            if band.role not in ("strip", "cuff", "waistband") and not is_flounce(band):
                 continue
             edges = [piece.edge(side.edge) for side in own if side.piece == piece.name]
-            if any(shapely.LineString(edge.line).distance(end) < _AT_END for edge in edges):
-                sewn = below.edge(other[0].edge).points
-                far = [points for name, points in below.internal_lines.items() if name.startswith("fold line")]
-                far += [edge.points for edge in below.edges if edge.kind == "hem"]
+            if any(shapely.LineString(edge.line).distance(shapely.Point(end)) < _AT_END for edge in edges):
+                sewn = band.edge(other[0].edge).points
+                far = [points for name, points in band.internal_lines.items() if name.startswith("fold line")]
+                far += [edge.points for edge in band.edges if edge.kind == "hem"]
                 return float(shapely.LineString(sewn).distance(shapely.LineString(far[0]))) if far else 0.0
-    return 0.0
+    return None
 
 
 def _laps(piece: DraftedPiece, hem: FloatArray) -> float:

@@ -59,6 +59,9 @@ STRIPS = ("strip", "waistband", "cuff")
 ALIKE = 5e-6
 #: A curve moves by no more than this [m] to be as long as what it is sewn to: a tenth of what a turned corner may move.
 SHIFT = 3e-4
+#: So many bumps move it, whose squared slopes are to be small; those of a seam's first side count this many times, and those of a curve
+#: that is straight in parts again this many times.
+BUMPS, OF_FIRST, IN_PARTS = (1, 2, 4, 8), 10.0, 100.0
 
 
 def fit_edges(
@@ -177,12 +180,14 @@ def equal_sides(
     """Return the curves with the sides of each seam as long as they should be, to some micrometres.
 
     Curves that keep near their points, and turned corners, leave a seam's sides some tenths of a millimetre apart. The curves of
-    the second side take up the difference, those that bend most of it: each moves along one direction by a smooth bump, at most by
-    `SHIFT`. Where these bend too little, the first side moves, too, and both by several bumps. Ends stay, with their directions. What
-    would have to move farther stays as it is. A straight strip, such as a band or a cuff, is stretched.
+    both sides take up the difference, above all those of the second side, and those that bend most: each moves by smooth bumps in
+    directions of their own, the least squares of whose slopes give the wanted length, so that no choice hangs on rounding. Ends stay,
+    with their directions. What would have to move farther than `SHIFT` stays as it is. A straight strip, such as a band or a cuff, is
+    stretched.
     """
     found, roles = dict(curves), {piece.name: piece.role for piece in pieces}
-    for seam in seams:
+    # A second step takes what the first one, on curves of few joints, has missed.
+    for seam in (seam for seam in seams for _ in range(2)):
         first, second = ([found[side.piece, side.edge] for side in row] for row in seam.sides)
         one, other = (sum(polyline_length(curve.sample()) for curve in curves) for curves in (first, second))
         more = one * (1.0 + seam.ease) - other
@@ -203,42 +208,41 @@ def equal_sides(
                 for key in [key for key in found if key[0] == side.piece]:
                     found[key] = found[key].transformed(np.column_stack([stretch, np.zeros(2)]))
             continue
-        # How the difference grows with each bump: one on every curve of the second side, and where these bend too little, as a nearly
-        # straight one or an S, on all curves, and with more bumps, each in a direction of its own.
-        # Curves that are straight in parts stay so, unless no others bend enough.
-        trials = [(seam.sides[1:], 1), *((seam.sides, count) for count in (1, 2, 4, 8))]
-        for (moved, count), of_curves in [
-            *((each, np.any) for each in trials),
-            *((each, np.all) for each in trials[1:]),
-        ]:
-            bends, total, most = dict[EdgeKey, FloatArray](), 0.0, 0.0
-            for row in moved:
-                for key in ((side.piece, side.edge) for side in row):
-                    line = found[key].sample()
-                    if not of_curves(found[key].straight) and len(line) > 2:
-                        # The length grows by the bumps' work on the turning tangent.
-                        tangents = np.diff(line, axis=0) / segment_lengths(line)[:, None]
-                        at = count * arc_lengths(line)[1:-1] / polyline_length(line)
-                        work = -(np.sin(np.pi * at) ** 2)[:, None] * np.diff(tangents, axis=0)
-                        bend = np.zeros((count, 2))
-                        np.add.at(bend, np.minimum(at.astype(int), count - 1), work)
-                        bends[key] = bend if row is seam.sides[1] else -(1.0 + seam.ease) * bend
-                        # Both copies of an edge that is sewn twice move.
-                        total += float((bends[key] ** 2).sum())
-                        most = max(most, float(np.linalg.norm(bends[key], axis=1).max()))
-            if bends and abs(more) * most <= SHIFT * total:
-                break
-        else:
+        more -= np.copysign(ALIKE, more)
+        # How the difference grows with each bump, over its cost.
+        ways, total = dict[EdgeKey, dict[int, FloatArray]](), 0.0
+        for row, of_side in zip(seam.sides, (-(1.0 + seam.ease), 1.0), strict=True):
+            for key in ((side.piece, side.edge) for side in row):
+                line = found[key].sample()
+                if found[key].straight.all() or len(line) < 3:
+                    continue
+                # The length grows by the bumps' work on the turning tangent.
+                tangents = np.diff(line, axis=0) / segment_lengths(line)[:, None]
+                at, turns = arc_lengths(line)[1:-1] / polyline_length(line), -of_side * np.diff(tangents, axis=0)
+                cost = (1.0 if row is seam.sides[1] else OF_FIRST) * (IN_PARTS if found[key].straight.any() else 1.0)
+                ways[key] = {}
+                for count in BUMPS:
+                    bend = np.zeros((count, 2))
+                    np.add.at(
+                        bend,
+                        np.minimum(count * at, count - 1).astype(int),
+                        np.sin(np.pi * count * at)[:, None] ** 2 * turns,
+                    )
+                    ways[key][count] = bend / (cost * count**2)
+                    # Both copies of an edge that is sewn twice move.
+                    total += float((bend * ways[key][count]).sum())
+        places = np.linspace(0.0, 1.0, 65)
+        moves = [abs(more) * np.linalg.norm(_bumps(way, places)[0], axis=1).max() for way in ways.values()]
+        if not ways or max(moves) > SHIFT * total:
             continue
-        for key, bend in bends.items():
+        for key, way in ways.items():
             bezier = found[key].bezier.copy()
             lengths = [
                 polyline_length(Curve(bezier=each[None], straight=np.zeros(1, dtype=bool)).sample()) for each in bezier
             ]
-            joints = count * np.concatenate([[0.0], np.cumsum(lengths)]) / sum(lengths)
-            way = more / total * bend[np.minimum(joints.astype(int), count - 1)]
-            bump = np.sin(np.pi * joints)[:, None] ** 2 * way
-            slope = count * np.pi * np.sin(2.0 * np.pi * joints)[:, None] / sum(lengths) * way
+            joints = np.concatenate([[0.0], np.cumsum(lengths)]) / sum(lengths)
+            bump, slope = (more / total * each for each in _bumps(way, joints))
+            slope /= sum(lengths)
             handles = np.linalg.norm(bezier[:, [1, 2]] - bezier[:, [0, 3]], axis=2)
             # Tangents at a joint turn alike on both of its sides.
             bezier[:, 0] += bump[:-1]
@@ -250,6 +254,21 @@ def equal_sides(
             straight = found[key].straight & (np.abs(bump[:-1]).max(axis=1) + np.abs(bump[1:]).max(axis=1) == 0.0)
             found[key] = replace(found[key], bezier=bezier, straight=straight)
     return found
+
+
+def _bumps(ways: Mapping[int, FloatArray], at: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the moves (#P by 2 [m]) of a curve at shares of its length, and their derivatives by the share.
+
+    Args:
+        ways: by how many bumps, how far [m] each of them moves the curve in its middle, #bumps by 2.
+        at: #P.
+    """
+    move, slope = np.zeros((len(at), 2)), np.zeros((len(at), 2))
+    for count, way in ways.items():
+        each = way[np.minimum(count * at, count - 1).astype(int)]
+        move += np.sin(np.pi * count * at)[:, None] ** 2 * each
+        slope += count * np.pi * np.sin(2.0 * np.pi * count * at)[:, None] * each
+    return move, slope
 
 
 def as_in_layout(

@@ -16,8 +16,11 @@ from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
 __all__ = ["CornerReport", "true_corners", "turned_end"]
 
 
-#: Corners whose angles are this [rad] or more from running on are meant to be corners.
-MEANT = np.radians(20.0)
+#: Corners whose angles are the second [rad] or more from running on are meant to be corners; from the first on they are turned less and
+#: less, so that rounding decides nothing.
+DOUBTED, MEANT = np.radians(17.0), np.radians(20.0)
+#: Squared turns, over all corners, count this much beside the squares of what corners miss.
+SMALL = 1e-4
 #: Turns less than this [rad] are left out.
 LEAST_TURN = np.radians(0.05)
 #: Turned edges are turned again for what bounds and kept lengths have left, so many times.
@@ -72,7 +75,8 @@ def true_corners(
 
     The turns are the smallest, by least squares over all corners, so that each piece takes its half of a difference.
     An end is turned over its last 30 to 60 mm and moves at most 3 mm; an edge that is sewn keeps its length. Legs of
-    darts and edges on a fold stay. Corners more than 20 degrees from running on are left: they are meant.
+    darts and edges on a fold stay. Corners more than 20 degrees from running on are left: they are meant. Of what others miss, those
+    17 to 20 degrees from it get a share.
 
     Args:
         pieces: of one size.
@@ -86,12 +90,14 @@ def true_corners(
 
     start = dict(curves)
     found = {frozenset(corner.ends): corner for corner in [*_seam_corners(pieces, seams), *_fold_corners(pieces)]}
-    corners = [corner for corner in found.values() if abs(corner.angle(start) - corner.wanted) < MEANT]
+    away = {corner: abs(corner.angle(start) - corner.wanted) for corner in found.values()}
+    corners = [corner for corner in found.values() if away[corner] < MEANT]
+    shares = np.array([min(1.0, (MEANT - away[corner]) / (MEANT - DOUBTED)) for corner in corners])
     sewn = {(side.piece, side.edge) for seam in seams for row in seam.sides for side in row}
     turns: dict[End, float] = {}
     trued, moves = dict(start), dict[End, float]()
     for _ in range(ROUNDS):
-        for end, turn in _least_turns(corners, trued).items():
+        for end, turn in _least_turns(corners, shares, trued).items():
             turns[end] = turns.get(end, 0.0) + turn
         # The curves with their ends turned, and the largest move [m] of each end.
         trued, moves = dict(start), {}
@@ -127,19 +133,31 @@ def true_corners(
     return trued, reports
 
 
-def _least_turns(corners: Sequence[_Corner], curves: Mapping[EdgeKey, Curve]) -> dict[End, float]:
-    """Return the smallest turns outwards [rad] of edges' ends that give all corners their wanted angles."""
+def _least_turns(corners: Sequence[_Corner], shares: FloatArray, curves: Mapping[EdgeKey, Curve]) -> dict[End, float]:
+    """Return the smallest turns outwards [rad] of edges' ends that give all corners their wanted angles.
+
+    Args:
+        corners: all that may be turned.
+        shares: #corners, from 0 to 1, of what a corner misses that it gets, were it alone.
+        curves: of all edges.
+    """
     ends = sorted({end for corner in corners for end in corner.outer})
     if not ends:
         return {}
     place = {end: k for k, end in enumerate(ends)}
-    rates = np.zeros((len(corners), len(ends)))
-    for row, corner in zip(rates, corners, strict=True):
+    rates, free = np.zeros((len(corners), len(ends))), np.zeros(len(ends))
+    for row, corner, share in zip(rates, corners, shares, strict=True):
         for end in (end for pair in corner.ends for end in pair):
             if end in place:
                 row[place[end]] += 1.0
+        # An end that runs on at a doubted corner alone is as free to turn as that is.
+        at = [place[end] for end in corner.outer]
+        free[at] = np.maximum(free[at], share)
     missing = np.array([corner.wanted - corner.angle(curves) for corner in corners])
-    solved = np.linalg.lstsq(rates, missing, rcond=1e-9)[0]
+    # Alone, a corner of weight w with one end gets w / (w + SMALL) of what it misses.
+    weights = np.sqrt(np.minimum(1.0, SMALL * shares / np.maximum(1.0 - shares, SMALL)))
+    system = np.concatenate([weights[:, None] * rates * free, np.sqrt(SMALL) * np.eye(len(ends))])
+    solved = free * np.linalg.lstsq(system, np.concatenate([weights * missing, np.zeros(len(ends))]), rcond=None)[0]
     return {end: float(turn) for end, turn in zip(ends, solved, strict=True) if abs(turn) > LEAST_TURN}
 
 

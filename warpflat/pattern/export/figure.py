@@ -1,43 +1,45 @@
-"""The kit of all pictures: a page, text and lines on it, pixels put on it as they are, and its PNG file."""
+"""The kit of all pictures: a page, text, lines and scales on it, pixels put on it as they are, and its file."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
-from matplotlib.patches import FancyArrowPatch
+from matplotlib.patches import FancyArrowPatch, Polygon
+from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from warpflat.core import FloatArray, IntArray, atomic_path
-from warpflat.flat import triangulate
-from warpflat.pattern.export.raster import rasterise, shade
+from warpflat.core import FloatArray, atomic_path, report_activity
+from warpflat.pattern.export.colours import Scale
+from warpflat.pattern.export.letters import all_letters
 
 __all__ = [
     "DPI",
     "GRAIN",
     "GREY",
-    "HALO_LAYER",
     "INK",
     "LABEL_SIZE",
     "MARGIN",
     "PAGE_WIDTH",
-    "POINT",
-    "ColouredFaces",
     "Pen",
     "Pixels",
+    "drawn_page",
     "keep_words_on_page",
     "new_figure",
+    "on_paper",
+    "picture_of",
     "write_figure",
     "write_moving_picture",
 ]
@@ -45,15 +47,15 @@ __all__ = [
 DPI = 150
 PAGE_WIDTH = 12.5  # [in], at most
 MARGIN = 0.25  # [in]
-POINT = 1.0 / 72.0  # [in]
 INK = (0.10, 0.11, 0.14)
 GREY = (0.36, 0.38, 0.42)
 GRAIN = (0.02, 0.27, 0.66)
 LABEL_SIZE = 7.5  # [pt]
-HALO_LAYER = 3.5  # below the outline
+_HALO, _HALO_LAYER = (1.0, 1.0, 1.0, 0.7), 3.5  # below the outline
+_SEGMENTS_TO_A_PATH = 500
+_PAPER = 249
 # Pages are large and mostly white: zlib's fastest level takes half the time of the usual one, and 1.2 times the bytes.
 _LEVEL = 1
-_PER_PIXEL = 2  # samples along either side
 
 
 def new_figure(width: float, height: float, *, dpi: int = DPI, **options: Any) -> Figure:
@@ -63,17 +65,37 @@ def new_figure(width: float, height: float, *, dpi: int = DPI, **options: Any) -
     return figure
 
 
-def write_figure(path: str | os.PathLike[str], figure: Figure) -> None:
-    """Draw a figure of :func:`new_figure` once, and write its pixels as opaque RGB at its own resolution; atomically.
+@contextmanager
+def drawn_page(
+    path: str | os.PathLike[str], width: float = PAGE_WIDTH, height: float = 4.0, *, dpi: int = DPI
+) -> Iterator[Pen]:
+    """Give the pen of a white page of a size [in] in a block, and write the page after it; atomically, with all letters.
 
     Raises:
         InputError: the file cannot be written.
     """
+    report_activity(f"drawing {os.path.basename(path)}")
+    with all_letters():
+        pen = Pen(width, height, dpi=dpi)
+        yield pen
+        write_figure(path, pen.figure)
+
+
+def picture_of(figure: Figure) -> Image.Image:
+    """Draw a figure of :func:`new_figure` once, as opaque RGB."""
     keep_words_on_page(figure)
     canvas: Any = figure.canvas
     canvas.draw()
-    image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
-    metadata = PngInfo()
+    return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+
+
+def write_figure(path: str | os.PathLike[str], figure: Figure) -> None:
+    """Write the pixels of a figure of :func:`new_figure` at its own resolution; atomically.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    image, metadata = picture_of(figure), PngInfo()
     metadata.add_text("Software", "warpflat")
     resolution = float(figure.dpi)
     with atomic_path(path) as temporary:
@@ -98,6 +120,12 @@ def write_moving_picture(
         pictures[0].save(temporary, format="WEBP", duration=list(durations), loop=0, quality=80, **more)
 
 
+def on_paper(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return RGBA pixels over light paper, RGB."""
+    cover = pixels[..., 3:] / 255.0
+    return np.round(_PAPER * (1.0 - cover) + pixels[..., :3] * cover).astype(np.uint8)
+
+
 def keep_words_on_page(figure: Any) -> None:
     """Shorten level texts of a figure with an Agg canvas that would run over its left or right edge, with dots at their ends."""
     renderer, page = figure.canvas.get_renderer(), figure.bbox
@@ -117,33 +145,44 @@ def keep_words_on_page(figure: Any) -> None:
 
 
 class Pen:
-    """Text and lines on the page, measured in inches from its lower left corner."""
+    """A page, and text and lines on it, measured in inches from its lower left corner.
 
-    def __init__(self, figure: Any) -> None:
-        self._figure = figure
-        self._renderer = figure.canvas.get_renderer()
+    Attributes:
+        figure: Matplotlib's.
+        axes: over the whole page, in inches: an axis for each drawing takes longer than all that is drawn in it.
+        width, height: of the page [in].
+        dpi: pixels per inch.
+    """
+
+    def __init__(self, width: float, height: float, *, dpi: int = DPI) -> None:
+        self.figure = new_figure(width, height, dpi=dpi)
+        self.dpi = dpi
+        self.axes: Any = self.figure.add_axes((0.0, 0.0, 1.0, 1.0))
         self._measured: dict[tuple[str, float, str], tuple[float, float]] = {}
-        self.axes: Any = None
-        self.page_width = PAGE_WIDTH
+        self.width, self.height = width, height
+        self.clear()
 
-    def open_page(self) -> None:
-        """Lay axes over the whole page, whose units are inches."""
-        width, height = self._figure.get_size_inches()
-        self.page_width = float(width)
-        self.axes = self._figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    def clear(self) -> None:
+        """Take away all that was drawn, but for scales of colours."""
+        self.axes.clear()
         self.axes.set_axis_off()
-        self.axes.set_xlim(0.0, width)
-        self.axes.set_ylim(0.0, height)
-        self.axes.set_autoscale_on(False)
+        self.resize(self.width, self.height)
+
+    def resize(self, width: float, height: float) -> None:
+        """Give the page another size [in]."""
+        self.width, self.height = float(width), float(height)
+        self.figure.set_size_inches(width, height)
+        self.axes.set(xlim=(0.0, width), ylim=(0.0, height), autoscale_on=False)
 
     def measure(self, text: str, size: float, weight: str = "normal") -> tuple[float, float]:
         """Return width and height of a line of text [in] at a size [pt]."""
         key = (text, size, weight)
         if key not in self._measured:
             font = FontProperties(size=size, weight=weight)
-            width, height, _ = self._renderer.get_text_width_height_descent(text, font, ismath=False)
+            canvas: Any = self.figure.canvas
+            width, height, _ = canvas.get_renderer().get_text_width_height_descent(text, font, ismath=False)
             # Letters without ink, as a soft hyphen, have no height.
-            self._measured[key] = max(width, 1.0) / DPI, max(height, 1.0) / DPI
+            self._measured[key] = max(width, 1.0) / self.dpi, max(height, 1.0) / self.dpi
         return self._measured[key]
 
     def shorten(self, text: str, size: float, room: float, weight: str = "normal") -> str:
@@ -167,15 +206,72 @@ class Pen:
         if halo:
             drawn.set_path_effects([withStroke(linewidth=2.4, foreground=(1.0, 1.0, 1.0, 0.85))])
 
-    def line(
-        self, points: FloatArray, *, width: float, colour: Any = INK, style: Any = "-", halo: bool = False
-    ) -> None:
-        """Draw a polyline (#N by 2); with a halo it stays visible on dark colours."""
+    def badge(self, x: float, y: float, text: str, colour: Any) -> None:
+        """Write a number on a white patch, which hides what lies below it."""
+        box = {
+            "boxstyle": "round,pad=0.3,rounding_size=0.8",
+            "facecolor": "white",
+            "edgecolor": colour,
+            "linewidth": 0.7,
+            "alpha": 0.94,
+        }
+        self.write(x, y, text, 7.5, ha="center", fontweight="bold", color=colour, bbox=box, zorder=9)
+
+    def line(self, points: FloatArray, *, width: float, colour: Any = INK, halo: bool = False, **look: Any) -> None:
+        """Draw a polyline (#N by 2); with a halo it stays visible on dark colours. The look is that of Matplotlib's lines."""
         x, y = points.T
         if halo:
-            below: dict[str, Any] = {"color": (1.0, 1.0, 1.0, 0.7), "linewidth": width + 1.6, "zorder": HALO_LAYER}
-            self.axes.add_artist(Line2D(x, y, **below))
-        self.axes.add_artist(Line2D(x, y, color=colour, linewidth=width, linestyle=style, zorder=5))
+            self.axes.add_artist(Line2D(x, y, color=_HALO, linewidth=width + 1.6, zorder=_HALO_LAYER))
+        self.axes.add_artist(Line2D(x, y, color=colour, linewidth=width, zorder=5, **look))
+
+    def segments(
+        self, ends: FloatArray, *, width: float, colour: Any = INK, halo: bool = False, zorder: float = 5
+    ) -> None:
+        """Draw straight segments (#S by 2 by 2), many to a path: a path each takes longer to set up than all of them to draw."""
+        parts = [ends[i : i + _SEGMENTS_TO_A_PATH] for i in range(0, len(ends), _SEGMENTS_TO_A_PATH)]
+        paths = [Path(part.reshape(-1, 2), np.tile([Path.MOVETO, Path.LINETO], len(part))) for part in parts]
+        layers = [(_HALO, width + 1.6, _HALO_LAYER)] if halo else []
+        for ink, thickness, layer in (*layers, (colour, width, zorder)):
+            look: dict[str, Any] = {"edgecolors": [ink], "linewidths": thickness, "capstyle": "round", "zorder": layer}
+            self.axes.add_collection(PathCollection(paths, facecolors="none", **look), autolim=False)
+
+    def polygon(self, points: FloatArray, **look: Any) -> None:
+        """Draw a closed outline (#N by 2); the look is that of Matplotlib's patches."""
+        # As an artist it moves no limits, which would be looked for along each of its sides.
+        self.axes.add_artist(Polygon(points, **look))
+
+    def scale_bar(self, left: float, y: float, inches_per_metre: float) -> float:
+        """Draw a bar of a round length whose lower left corner is at (`left`, `y`) [in]; return where its words end."""
+        steps = np.outer(10.0 ** np.arange(-6, 4), [1.0, 2.0, 5.0]).ravel()
+        metres = float(steps[max(int(np.searchsorted(steps, 1.3 / inches_per_metre, side="right")) - 1, 0)])
+        wide = metres * inches_per_metre
+        for part, fill in enumerate((INK, "white")):
+            start, end = left + 0.5 * part * wide, left + 0.5 * (part + 1) * wide
+            corners = np.array([(start, y), (end, y), (end, y + 0.06), (start, y + 0.06)])
+            self.polygon(corners, facecolor=fill, edgecolor=INK, linewidth=0.7, zorder=6)
+        text = f"{100 * metres:.0f} cm" if metres >= 0.00999 else f"{1000 * metres:.3g} mm"
+        self.write(left + wide + 0.08, y + 0.03, text, 9, color=GREY)
+        return left + wide + 0.08 + self.measure(text, 9)[0]
+
+    def colour_bar(
+        self, scale: Scale, left: float, bottom: float, wide: float, tall: float, *, extend: str = "", unit: str = ""
+    ) -> Any:
+        """Draw a scale of colours in a box [in], along its longer side; return Matplotlib's colour bar.
+
+        Args:
+            scale: of the colours.
+            left, bottom, wide, tall: of the box.
+            extend: which ends have a tip for what lies beyond, as Matplotlib names them; those that are not 0 if not given.
+            unit: written beside it.
+        """
+        box = (left / self.width, bottom / self.height, wide / self.width, tall / self.height)
+        extend = extend or ("max" if scale.low == 0.0 else "both")
+        along = "horizontal" if wide > tall else "vertical"
+        bar = self.figure.colorbar(
+            scale.mappable, cax=self.figure.add_axes(box), orientation=along, extend=extend, label=unit
+        )
+        bar.ax.tick_params(labelsize=8)
+        return bar
 
     def arrow(self, ends: FloatArray, *, width: float, colour: Any, head: float, halo: bool = False) -> None:
         """Draw a straight line (2 by 2) with a filled head at either end."""
@@ -183,12 +279,12 @@ class Pen:
         options = {"arrowstyle": style, "color": colour, "linewidth": width, "shrinkA": 0, "shrinkB": 0, "zorder": 6}
         patch = FancyArrowPatch(tuple(ends[0]), tuple(ends[1]), **options)
         if halo:
-            patch.set_path_effects([withStroke(linewidth=width + 1.6, foreground=(1.0, 1.0, 1.0, 0.7))])
+            patch.set_path_effects([withStroke(linewidth=width + 1.6, foreground=_HALO)])
         self.axes.add_patch(patch)
 
 
 class Pixels(Artist):
-    """RGBA pixels at a place on a figure that is drawn at the resolution for which they were made."""
+    """RGBA pixels (#R by #C by 4, row 0 at the bottom) at a place on a figure that is drawn at the resolution for which they were made."""
 
     def __init__(self, pixels: NDArray[np.uint8], *, left: int, bottom: int, zorder: float) -> None:
         """Place `pixels` (#R by #C by 4, row 0 at the top) on the page.
@@ -199,51 +295,12 @@ class Pixels(Artist):
             zorder: layer.
         """
         super().__init__()
-        self._pixels = np.ascontiguousarray(pixels[::-1])
+        self.pixels = np.ascontiguousarray(pixels[::-1])
         self._corner = (left, bottom)
         self.set_zorder(zorder)
 
     def draw(self, renderer: Any) -> None:
         """Draw the pixels."""
         context = renderer.new_gc()
-        renderer.draw_image(context, *self._corner, self._pixels)
-        context.restore()
-
-
-class ColouredFaces(Artist):
-    """Faces in the plane, each in one colour, without seams between them, as pixels: a polygon each takes longer than all else on a page.
-
-    Attributes:
-        points: #P by 2, in the units of the axis.
-        mappable: the scale of the colours.
-    """
-
-    def __init__(self, points: FloatArray, faces: IntArray, values: FloatArray, mappable: ScalarMappable) -> None:
-        """Prepare faces in the units of the axis to which they are added.
-
-        Args:
-            points: #P by 2.
-            faces: #F by 4.
-            values: #F.
-            mappable: their colours.
-        """
-        super().__init__()
-        self.mappable = mappable
-        self.points, self._colours = points, np.asarray(mappable.to_rgba(values))[:, :3]
-        self._triangles, self._face = triangulate(faces)
-        self.set_zorder(1)
-
-    def draw(self, renderer: Any) -> None:
-        """Draw the pixels, at the renderer's resolution."""
-        assert self.axes is not None
-        at = self.axes.transData.transform(self.points)
-        low = np.floor(at.min(axis=0)) - 1.0
-        columns, rows = (np.ceil(at.max(axis=0)) + 1.0 - low).astype(int).tolist()
-        grid = np.zeros((len(at), 3))
-        grid[:, :2] = (at - low) * _PER_PIXEL
-        # Row 0 is at the bottom, as the renderer has it.
-        samples = rasterise(grid, self._triangles, (rows * _PER_PIXEL, columns * _PER_PIXEL))
-        pixels = shade(samples, _PER_PIXEL, grid, self._triangles, self._colours, face=self._face)
-        context = renderer.new_gc()
-        renderer.draw_image(context, *low, pixels)
+        renderer.draw_image(context, *self._corner, self.pixels)
         context.restore()

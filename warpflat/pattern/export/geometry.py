@@ -12,7 +12,6 @@ from warpflat.flat import area_vectors, triangulate
 
 __all__ = [
     "Polylines",
-    "corner_average",
     "corner_mean",
     "face_areas",
     "outline_edges",
@@ -43,27 +42,6 @@ def corner_mean(values: FloatArray, faces: IntArray) -> FloatArray:
     """Return the mean of the values (#V) at the corners of each face (#F by 4, -1 as the fourth of a triangle), #F."""
     used = faces >= 0
     return np.asarray(np.where(used, values[faces], 0.0).sum(axis=1) / used.sum(axis=1))
-
-
-def corner_average(
-    values: FloatArray,
-    weights: FloatArray,
-    face: IntArray,
-    vertex: IntArray,
-    count: int,
-) -> FloatArray:
-    """Return the mean of the face values around each vertex, weighted by face (#V); 0 where no face is.
-
-    Args:
-        values, weights: #F.
-        face, vertex: #C, the face and the vertex of each corner.
-        count: the number of vertices.
-    """
-    # A sliver without area still counts a little, so that a vertex among slivers only has a colour.
-    weights = weights + (1e-9 * float(weights.max(initial=0.0)) or 1.0)
-    share = np.bincount(vertex, weights=weights[face], minlength=count)
-    summed = np.bincount(vertex, weights=(values * weights)[face], minlength=count)
-    return np.asarray(summed / np.where(share > 0.0, share, 1.0))
 
 
 def outline_edges(faces: IntArray) -> IntArray:

@@ -25,7 +25,7 @@ from warpflat.pattern.drafting.placement import (
     spots_beyond_ends,
 )
 from warpflat.pattern.export.figure import GRAIN, INK, LABEL_SIZE, Pen
-from warpflat.pattern.export.picture_views import DrawnView
+from warpflat.pattern.export.views import DrawnView
 
 __all__ = ["draw_lines"]
 
@@ -58,9 +58,9 @@ def draw_lines(
             if drawn.view.vectors is None or name == datum:
                 if len(points) > 1:
                     style = (0, (9, 2.5, 2, 2.5)) if name == datum else "-"
-                    pen.line(points, width=1.3, colour=GRAIN if name == datum else INK, style=style, halo=True)
+                    pen.line(points, width=1.3, colour=GRAIN if name == datum else INK, linestyle=style, halo=True)
             else:
-                drawn.draw_segments(pen.axes, np.column_stack([part[:-1], part[1:]]), width=1.1, halo=True, zorder=5)
+                drawn.draw_segments(np.column_stack([part[:-1], part[1:]]), width=1.1, halo=True)
         longest = max(visible, key=polyline_length)
         # The legs of darts need no names: everybody sees what they are.
         if len(longest) > 1 and not name.endswith((".left", ".right")):

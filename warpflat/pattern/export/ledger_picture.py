@@ -10,11 +10,10 @@ import numpy as np
 
 from warpflat.core import FloatArray
 from warpflat.flat import join_surfaces
-from warpflat.pattern.export.colours import energy_colours, energy_scale
-from warpflat.pattern.export.figure import PAGE_WIDTH, Pen, new_figure, write_figure
+from warpflat.pattern.export.colours import Scale, energy_scale
+from warpflat.pattern.export.figure import GREY, INK, PAGE_WIDTH, drawn_page
 from warpflat.pattern.export.geometry import polylines_of
-from warpflat.pattern.export.letters import all_letters
-from warpflat.pattern.export.picture_views import DrawnView, make_facets, surface_view, view_from_side
+from warpflat.pattern.export.views import draw_row, make_facets, surface_view, view_from_side
 
 if TYPE_CHECKING:
     from warpflat.flat import Ledger, LedgerEntry
@@ -26,7 +25,6 @@ _BODY = 4.6
 _GAP = 0.5  # between two views
 _TABLE = 5.35  # where the table begins
 _COLUMNS = (("per cm", 8.1), ("released", 9.0), ("left", 9.75), ("length", 10.5), ("opening", 11.35), ("angle", 12.1))
-_GREY = (0.36, 0.38, 0.42)
 _INKS = ((0.02, 0.27, 0.66), (0.00, 0.42, 0.36), (0.35, 0.20, 0.60), (0.10, 0.11, 0.14))
 _MOST = 24
 
@@ -43,7 +41,6 @@ def candidate_words(entry: LedgerEntry) -> tuple[str, str, str, str, str, str]:
     )
 
 
-@all_letters()
 def write_ledger_picture(path: str | os.PathLike[str], ledger: Ledger) -> None:
     """Draw the candidates' paths, numbered as in the table beside them, over the energy that the piece stores now.
 
@@ -53,62 +50,58 @@ def write_ledger_picture(path: str | os.PathLike[str], ledger: Ledger) -> None:
     entries = ledger.entries[:_MOST]
     surface = join_surfaces([piece.surface for piece in ledger.pieces])
     density = np.concatenate([piece.face_energy_density for piece in ledger.pieces])
-    facets, centre = make_facets(surface.faces), surface.vertices.mean(axis=0)
-    views = [surface_view(surface, facets, polylines_of({}))]
+    facets = make_facets(surface.faces)
+    views = {"": surface_view(surface, facets, polylines_of({}))}
     if len(ledger.pieces) > 1:  # around a body
-        views = [view_from_side(surface.vertices - centre, facets, degrees) for degrees in (0.0, 180.0)]
-    sizes = np.array([view.size[:2] for view in views])
+        views = {
+            "front": view_from_side(surface.vertices, facets, 0.0),
+            "back": view_from_side(surface.vertices, facets, 180.0),
+        }
+    sizes = np.array([view.size[:2] for view in views.values()])
     per_metre = min((_BODY - _GAP * (len(views) - 1)) / float(sizes[:, 0].sum()), 5.2 / float(sizes[:, 1].max()))
     tall = max(float(sizes[:, 1].max()) * per_metre + 0.7, _ROW * (len(entries) + 2))
     height = tall + 1.15
-    figure = new_figure(PAGE_WIDTH, height)
-    pen = Pen(figure)
-    pen.open_page()
-    pen.write(0.45, height - 0.35, f"{ledger.name}: where to cut", 15, fontweight="bold")
-    peak = ledger.peaks[0] if ledger.peaks else "none inside"
-    energy = sum(piece.stages[-1].strain_energy_j for piece in ledger.pieces)
-    stored = f"strain energy {1e3 * energy:.0f} mJ"
-    pen.write(0.45, height - 0.64, f"{stored}; highest density: {peak}", 9.5, color=_GREY)
-    scale = energy_scale(density, np.concatenate([piece.worn.area for piece in ledger.pieces]))
-    shown, left = list[DrawnView](), 0.45
-    for view, (wide, high) in zip(views, sizes * per_metre, strict=True):
-        shown.append(DrawnView(view, left=left, bottom=height - 1.15 - float(high), inches_per_metre=per_metre))
-        shown[-1].draw(pen.axes, energy_colours(density, scale))
-        left += float(wide) + _GAP
-    # The views' directions, found again from what they did to the vertices.
-    turns = [np.linalg.lstsq(surface.vertices - centre, view.points, rcond=None)[0] for view in views]
-    placed: list[FloatArray] = []
-    labels: dict[tuple[float, float], list[str]] = {}
-    for number, entry in reversed(list(enumerate(entries, start=1))):
-        ink = _INKS[(number - 1) % len(_INKS)]
-        for points in entry.paths:
-            # In the view on whose side of the body it lies.
-            seen = [(points - centre) @ turn for turn in turns]
-            nearest = int(np.argmax([float(each[:, 2].mean()) for each in seen]))
-            page = shown[nearest].to_page(seen[nearest])
-            pen.line(page, width=1.4, colour=ink, halo=True)
-            spot = page[len(page) // 3]
-            near = next((known for known in placed if np.linalg.norm(known - spot) < 0.17), None)
-            if near is None:
-                placed.append(spot)
-                near = spot
-            labels.setdefault((float(near[0]), float(near[1])), []).insert(0, str(number))
-    for (x, y), numbers in labels.items():
-        text = ", ".join(dict.fromkeys(numbers))
-        box = {"boxstyle": "round,pad=0.18", "facecolor": "white", "edgecolor": _GREY, "linewidth": 0.5, "alpha": 0.92}
-        pen.axes.text(x, y, text, fontsize=7.5, ha="center", va="center", fontweight="bold", zorder=9, bbox=box)
-    top = height - 1.0
-    for words, x in _COLUMNS:
-        pen.write(x, top, words, 8.5, color=_GREY, ha="right")
-    best = max((entry.per_cm for entry in entries), default=1.0)
-    for number, entry in enumerate(entries, start=1):
-        y = top - _ROW * number
-        ink = _INKS[(number - 1) % len(_INKS)]
-        pen.write(_TABLE, y, f"{number}", 9, color=ink, fontweight="bold", ha="right")
-        pen.write(_TABLE + 0.1, y + 0.055, pen.shorten(entry.name, 8.5, 2.05), 8.5)
-        width = 2.0 * max(entry.per_cm, 0.0) / max(best, np.finfo(float).tiny)
-        bar = np.array([[_TABLE + 0.1, y - 0.07], [_TABLE + 0.1 + width, y - 0.07]])
-        pen.axes.plot(bar[:, 0], bar[:, 1], color=ink, linewidth=3.2, solid_capstyle="butt", zorder=5)
-        for (_, x), text in zip(_COLUMNS, candidate_words(entry), strict=True):
-            pen.write(x, y, text, 8.5, ha="right")
-    write_figure(path, figure)
+    with drawn_page(path, PAGE_WIDTH, height) as pen:
+        pen.write(0.45, height - 0.35, f"{ledger.name}: where to cut", 15, fontweight="bold")
+        peak = ledger.peaks[0] if ledger.peaks else "none inside"
+        energy = sum(piece.stages[-1].strain_energy_j for piece in ledger.pieces)
+        stored = f"strain energy {1e3 * energy:.0f} mJ"
+        pen.write(0.45, height - 0.64, f"{stored}; highest density: {peak}", 9.5, color=GREY)
+        areas = np.concatenate([piece.worn.area for piece in ledger.pieces])
+        colours = Scale(high=energy_scale(density, areas)).rgb(density)
+        bottom = height - 1.15 - float(sizes[:, 1].max()) * per_metre
+        shown = draw_row(
+            pen, views, [colours] * len(views), left=0.45, bottom=bottom, inches_per_metre=per_metre, gap=_GAP
+        )
+        placed: list[FloatArray] = []
+        labels: dict[tuple[float, float], list[str]] = {}
+        for number, entry in reversed(list(enumerate(entries, start=1))):
+            ink = _INKS[(number - 1) % len(_INKS)]
+            for points in entry.paths:
+                # In the view on whose side of the body it lies.
+                seen = [points @ view.directions.T for view in views.values()]
+                nearest = int(np.argmax([float(each[:, 2].mean()) for each in seen]))
+                page = shown[nearest].to_page(seen[nearest])
+                pen.line(page, width=1.4, colour=ink, halo=True)
+                spot = page[len(page) // 3]
+                near = next((known for known in placed if np.linalg.norm(known - spot) < 0.17), None)
+                if near is None:
+                    placed.append(spot)
+                    near = spot
+                labels.setdefault((float(near[0]), float(near[1])), []).insert(0, str(number))
+        for (x, y), numbers in labels.items():
+            pen.badge(x, y, ", ".join(dict.fromkeys(numbers)), INK)
+        top = height - 1.0
+        for words, x in _COLUMNS:
+            pen.write(x, top, words, 8.5, color=GREY, ha="right")
+        best = max((entry.per_cm for entry in entries), default=1.0)
+        for number, entry in enumerate(entries, start=1):
+            y = top - _ROW * number
+            ink = _INKS[(number - 1) % len(_INKS)]
+            pen.write(_TABLE, y, f"{number}", 9, color=ink, fontweight="bold", ha="right")
+            pen.write(_TABLE + 0.1, y + 0.055, pen.shorten(entry.name, 8.5, 2.05), 8.5)
+            width = 2.0 * max(entry.per_cm, 0.0) / max(best, np.finfo(float).tiny)
+            bar = np.array([[_TABLE + 0.1, y - 0.07], [_TABLE + 0.1 + width, y - 0.07]])
+            pen.line(bar, width=3.2, colour=ink, solid_capstyle="butt")
+            for (_, x), text in zip(_COLUMNS, candidate_words(entry), strict=True):
+                pen.write(x, y, text, 8.5, ha="right")

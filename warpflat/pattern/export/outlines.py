@@ -30,6 +30,8 @@ __all__ = [
 MEET = 5e-5
 # Cloth of this area [m2] at most is left out where an outline crosses itself at a corner: an allowance's width, squared.
 _CORNER = 1e-4
+# A line that crosses itself about so many times is a scribble.
+_SCRIBBLE = 1e6
 # A closed line around no more than this [m2] is a mark, or a line to and fro.
 _POINT = 1e-6
 # A line whose ends lack less than this share of its length to meet, a side at most, is an outline that does not close, if it goes
@@ -138,6 +140,11 @@ def simple_ring(points: FloatArray, where: str) -> FloatArray:
     polygon = shapely.Polygon(points)
     if polygon.is_valid and polygon.area > 0.0:
         return points
+    # A line of length L drawn at random within an area A crosses itself L^2 / (pi A) times (Santalo, Integral Geometry).
+    if polygon.length**2 > _SCRIBBLE * np.pi * polygon.convex_hull.area > 0.0:
+        raise InputError(
+            f"{where}: its outline crosses itself all over, {polygon.length:.0f} m of it; a piece has one outer line"
+        )
     faces = shapely.get_parts(shapely.polygonize([shapely.node(shapely.LinearRing(points))]))
     parts = sorted(shapely.get_parts(shapely.union_all(faces)), key=lambda part: -part.area)
     if not parts or parts[0].area <= 0.0:

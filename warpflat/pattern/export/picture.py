@@ -5,32 +5,56 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from matplotlib.patches import Polygon
-from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
-from warpflat.core import FloatArray, IntArray, report_activity
+from warpflat.core import FloatArray, IntArray
 from warpflat.flat import Surface
-from warpflat.pattern.export.colours import SMALLEST_SCALE, energy_colours, energy_scale
-from warpflat.pattern.export.figure import DPI, GREY, MARGIN, PAGE_WIDTH, POINT, Pen, Pixels, new_figure, write_figure
-from warpflat.pattern.export.geometry import polylines_of
+from warpflat.pattern.drafting.placement import LabelRoom, Spot
+from warpflat.pattern.export.colours import DRAFTED_CLOTH, SKIN, SMALLEST_SCALE, Scale, energy_scale
+from warpflat.pattern.export.dressed import Body, dress
+from warpflat.pattern.export.figure import GRAIN, GREY, INK, LABEL_SIZE, MARGIN, PAGE_WIDTH, Pen, drawn_page
+from warpflat.pattern.export.geometry import face_areas, polylines_of
+from warpflat.pattern.export.labels import draw_lines
 from warpflat.pattern.export.letters import all_letters, is_drawn, titles
-from warpflat.pattern.export.picture_drafted import DraftedOutline, DraftedRows, worn_words
-from warpflat.pattern.export.picture_garment import Body, GarmentViews
-from warpflat.pattern.export.picture_page import CAPTIONS_ALONE, STRIP, Cell, draw_cell, draw_scale_bar, lay_out
-from warpflat.pattern.export.picture_views import make_facets, pattern_view, surface_view
+from warpflat.pattern.export.packing import pack_boxes, pack_rows
+from warpflat.pattern.export.views import (
+    SIDES,
+    DrawnView,
+    View,
+    draw_row,
+    make_facets,
+    pattern_view,
+    surface_view,
+    view_from_side,
+)
 
-__all__ = ["PicturePiece", "draw_figure", "write_picture"]
+__all__ = ["DraftedOutline", "PicturePiece", "draw_figure", "write_picture"]
 
-SCALE_BAR = 2.3  # [in], for the scale of lengths left of the colour bar, as all that follows
-_BAR_HEIGHT = 0.17
-_BAR_TIP = 0.03  # of its length, for what lies above the scale
-_NOTE, _POWER, _PLAIN = 2.0, 0.7, 0.35  # room right of the bar: for what it leaves out, for a power of ten, for neither
-_SHORTEST_BAR = 1.2
-_WORDS_SIZE, _TICK_SIZE = 9.5, 8.5  # [pt]
+# All lengths in inches, all sizes of letters in points. Above all there is a strip with the scales of length and colour.
+_STRIP, _SCALE_BAR, _BAR_HEIGHT, _WORDS_SIZE = 0.66, 2.3, 0.17, 9.5
+_NOTE, _PLAIN, _SHORTEST_BAR = 2.0, 0.5, 1.2  # room right of the colour bar: for what it leaves out, or for nothing
+_ROOM = PAGE_WIDTH - 2 * MARGIN
+_NARROWEST_PAGE = 8.8
+# A piece: room for names beside, below and above its views, for the heading of a view, and for a line of its captions.
+_BESIDE, _FOOT, _NAMED, _HEADING, _LINE = 0.2, 0.22, 0.18, 0.4, 0.15
+_BETWEEN, _CAPTION_SIZE, _TITLE_SIZE = "  ·  ", 7.5, 10.5
+_LONGEST_NAME = 5.4  # two of them have room side by side
+_SMALLEST_PATTERN, _NARROWEST = 2.0, 1.6
+_STACKED = 2.6  # width of two views side by side over their height, from which they stand one below the other
+_TALLEST_PIECE = 8.0  # half as much again if its views are stacked
+_TALLEST, _TALLEST_WORN = 15.0, 24.0  # all pieces, and with the garment on its body
+_SCALES = 0.95 ** np.arange(54)
+_REORDERED = 0.02  # how much more of the page pieces must cover to stand otherwise than in rows, in their own order
+_SHORTEST_GRAIN = 0.28  # half its length
+# The garment on its body: scales that are tried, its greatest height, the room above, below and between its views.
+_BAND_SCALES, _BAND_TALLEST, _BAND_HEAD, _BAND_FOOT, _BAND_GAP = (1.0, 0.9, 0.8, 0.7), 9.0, 0.26, 0.30, 0.25
+# It lies on the mannequin: it is drawn this much nearer to the eye, and drafted pieces, such as patches, over it [m].
+_NEARER, _OVER = 0.012, 0.004
+# Drafted outlines: their colour, their heading, room for a name above each, and gaps between them.
+_CLOTH, _ROWS_HEADING, _NAME, _GAP, _NAME_SIZE = (0.95, 0.94, 0.91), 0.36, 0.20, 0.22, 8.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,7 +86,21 @@ class PicturePiece:
     captions: Mapping[str, str] = field(default_factory=dict)
 
 
-@all_letters()
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DraftedOutline:
+    """A drafted piece.
+
+    Attributes:
+        name: that is written above it.
+        points: #P by 2 [m], its sewing line, closed, the first point not repeated.
+        worn: its copies where they are worn; none of what lies within the garment.
+    """
+
+    name: str
+    points: FloatArray
+    worn: Sequence[Surface] = ()
+
+
 def write_picture(
     path: str | os.PathLike[str],
     pieces: Sequence[PicturePiece],
@@ -87,11 +125,10 @@ def write_picture(
         InputError: the file cannot be written.
         ValueError: there is no piece.
     """
-    report_activity(f"drawing {Path(path).name}")
-    write_figure(path, draw_figure(pieces, quantity=quantity, scale=scale, body=body, drafted=drafted))
+    with drawn_page(path) as pen:
+        _draw(pen, pieces, quantity, scale, body, drafted)
 
 
-@all_letters()
 def draw_figure(
     pieces: Sequence[PicturePiece],
     *,
@@ -105,150 +142,443 @@ def draw_figure(
     Raises:
         ValueError: there is no piece.
     """
+    with all_letters():
+        pen = Pen(PAGE_WIDTH, 4.0)
+        _draw(pen, pieces, quantity, scale, body, drafted)
+    return pen.figure
+
+
+def _draw(
+    pen: Pen,
+    pieces: Sequence[PicturePiece],
+    quantity: str,
+    highest: float | None,
+    body: Body | None,
+    drafted: Sequence[DraftedOutline],
+) -> None:
+    """Draw all on a page, which gets the size that it needs."""
     if not pieces:
         raise ValueError("a picture needs at least one piece")
-    shown_names = titles([piece.name for piece in pieces], is_drawn)
-    alone = body is None and len(pieces) == 1
-    cells = [_prepared(piece, shown_names[piece.name], shows_body=body is None, alone=alone) for piece in pieces]
+    names = titles([piece.name for piece in pieces], is_drawn)
     density = np.concatenate([np.asarray(piece.face_energy_density, dtype=np.float64) for piece in pieces])
-    areas = np.concatenate([cell.areas for cell in cells])
-    scale = energy_scale(density, areas) if scale is None else scale
-    figure = new_figure(PAGE_WIDTH, 4.0)
-    pen = Pen(figure)
+    areas = np.concatenate([face_areas(piece.surface.vertices, piece.surface.faces) for piece in pieces])
+    scale = Scale(high=energy_scale(density, areas) if highest is None else highest)
+    cells = [_cell(piece, names[piece.name], scale, shows_body=body is None) for piece in pieces]
+    if len(cells) == 1 and body is None:
+        cells[0].narrowest = _NARROWEST_PAGE - 2 * MARGIN
     # The first caption that is the same in all cells stands left of the colour bar, if there is room for it.
     shared = ""
-    for key, value in cells[0].captions.items() if len(cells) > 1 else ():
+    for key, value in list(cells[0].captions.items()) if len(cells) > 1 else ():
         caption = f"{key} {value}"
-        if all(cell.captions.get(key) == value for cell in cells) and pen.measure(caption, 7.5)[0] < SCALE_BAR - 0.1:
+        fits = pen.measure(caption, _CAPTION_SIZE)[0] < _SCALE_BAR - 0.1
+        if fits and all(cell.captions.get(key) == value for cell in cells):
             for cell in cells:
-                cell.captions = {other: text for other, text in cell.captions.items() if other != key}
+                del cell.captions[key]
             shared = caption
             break
-    worn = None
-    if body is not None:
-        worn = GarmentViews(
-            body,
-            [piece.surface for piece in pieces],
-            [cell.density for cell in cells],
-            [surface for each in drafted for surface in each.worn],
-            worn_words(drafted),
-        )
-    left = MARGIN + (CAPTIONS_ALONE if alone else SCALE_BAR)
-    words = pen.measure(_bar_words(scale, density, quantity), _WORDS_SIZE)[0]
-    narrowest = left + (
-        words + (MARGIN if _is_flat(scale, density) else 0.15 + _SHORTEST_BAR + _right_of_bar(scale, density))
-    )
-    width, height, page_scale = lay_out(pen, cells, worn, narrowest=narrowest)
-    rows = DraftedRows(pen, drafted, width - 2 * MARGIN, page_scale) if drafted else None
-    height += STRIP + (0.0 if rows is None else rows.height)
-    figure.set_size_inches(width, height)
-    pen.open_page()
-    if not alone:
-        draw_scale_bar(pen, MARGIN, height - 0.27, page_scale)
-        pen.write(MARGIN, height - 0.48, shared, 7.5, color=GREY)
-    _draw_colour_bar(pen, scale, density, areas, quantity, left=left, top=height)
-    top = height - STRIP
-    if worn is not None:
-        worn.draw(pen, MARGIN, top, scale)
+    band = None if body is None else _Band(body, pieces, drafted, scale)
+    width, height, page_scale = _lay_out(pen, cells, band)
+    rows = _DraftedRows(pen, drafted, width - 2 * MARGIN, page_scale) if drafted else None
+    pen.resize(width, height + _STRIP + (0.0 if rows is None else rows.height))
+    pen.scale_bar(MARGIN, pen.height - 0.27, page_scale)
+    pen.write(MARGIN, pen.height - 0.48, shared, _CAPTION_SIZE, color=GREY)
+    _draw_colours(pen, scale, density, areas, quantity)
+    top = pen.height - _STRIP
+    if band is not None:
+        band.draw(pen, MARGIN, top)
     for cell in cells:
-        draw_cell(pen, cell, top, scale, page_scale)
+        _draw_cell(pen, cell, top, page_scale)
     if rows is not None:
         rows.draw(pen, MARGIN, rows.height)
-    return figure
 
 
-def _prepared(piece: PicturePiece, title: str, *, shows_body: bool, alone: bool) -> Cell:
-    """Return the cell of a piece, with its two views."""
-    surface, positions = piece.surface, np.asarray(piece.positions, dtype=np.float64)
-    faces = np.asarray(piece.faces, dtype=np.int32)
-    in_space = surface.lines if piece.surface_lines is None else piece.surface_lines
-    in_plane = make_facets(faces)
-    on_body = in_plane if np.array_equal(faces, surface.faces) else make_facets(surface.faces)
-    cell = Cell(
-        name=title,
-        captions=piece.captions,
-        density=np.asarray(piece.face_energy_density, dtype=np.float64),
-        on_body=surface_view(surface, on_body, polylines_of(in_space)),
-        pattern=pattern_view(positions, in_plane, polylines_of(piece.lines)),
-        datum=piece.datum,
-        grain_angle=piece.grain_angle,
-        shows_body=shows_body,
-        alone=alone,
-    )
-    cell.stack_if_wide()
-    return cell
-
-
-def _is_flat(scale: float, density: FloatArray) -> bool:
-    return scale <= SMALLEST_SCALE and not (density > scale).any()
-
-
-def _bar_words(scale: float, density: FloatArray, quantity: str) -> str:
-    return f"{quantity}: none, the cloth lies flat without strain" if _is_flat(scale, density) else f"{quantity} [J/m²]"
-
-
-def _right_of_bar(scale: float, density: FloatArray) -> float:
-    return _NOTE if (density > scale).any() else _POWER if _ticks(scale, 1.0)[2] else _PLAIN
-
-
-def _draw_colour_bar(
-    pen: Pen, scale: float, density: FloatArray, areas: FloatArray, quantity: str, *, left: float, top: float
-) -> None:
-    """Draw the colour bar from `left` [in] to the right margin, and the share of the area above its end.
-
-    The page must leave `_colour_bar_room`. A surface without strain needs no scale: words say so.
-
-    Args:
-        scale: upper end of the colours [J/m2].
-        density, areas: #F [J/m2] and [m2] of all faces.
-        quantity: what the colours show.
-        left, top: of the strip [in].
-    """
-    above = density > scale
-    words = _bar_words(scale, density, quantity)
-    pen.write(left, top - 0.24, words, _WORDS_SIZE)
-    if _is_flat(scale, density):
+def _draw_colours(pen: Pen, scale: Scale, density: FloatArray, areas: FloatArray, quantity: str) -> None:
+    """Draw the scale of the colours up to the right margin, and the share of the area above its end; words if there is no strain."""
+    left, top, above = MARGIN + _SCALE_BAR, pen.height - 0.24, density > scale.high
+    if scale.high <= SMALLEST_SCALE and not above.any():
+        words = f"{quantity}: none, the cloth lies flat without strain"
+        pen.write(left, top, pen.shorten(words, _WORDS_SIZE, pen.width - left - MARGIN), _WORDS_SIZE)
         return
+    right = pen.width - (_NOTE if above.any() else _PLAIN)
+    words = pen.shorten(f"{quantity} [J/m²]", _WORDS_SIZE, right - left - 0.15 - _SHORTEST_BAR)
+    pen.write(left, top, words, _WORDS_SIZE)
     left += pen.measure(words, _WORDS_SIZE)[0] + 0.15
-    right = pen.page_width - _right_of_bar(scale, density)
-    upper = top - 0.24 + 0.5 * _BAR_HEIGHT
-    lower = upper - _BAR_HEIGHT
-    end = left + (right - left) / (1.0 + _BAR_TIP) if above.any() else right
-    first, last = round(left * DPI), round(end * DPI)
-    shades = energy_colours((np.arange(last - first) + 0.5) / (last - first), 1.0)
-    strip = np.full((round(_BAR_HEIGHT * DPI), last - first, 4), 255, dtype=np.uint8)
-    strip[..., :3] = np.round(255.0 * shades)
-    pen.axes.add_artist(Pixels(strip, left=first, bottom=round(lower * DPI), zorder=1))
-    outline = [(left, lower), (end, lower), (end, upper), (left, upper)]
-    if above.any():
-        tip = (right, 0.5 * (lower + upper))
-        # It starts one pixel earlier, so that no white shows between.
-        corners = [(end - 1.0 / DPI, lower), (end, lower), tip, (end, upper), (end - 1.0 / DPI, upper)]
-        pen.axes.add_patch(Polygon(corners, facecolor=energy_colours([1.0], 1.0)[0], linewidth=0, zorder=1))
-        outline.insert(2, tip)
-    pen.axes.add_patch(Polygon(outline, fill=False, edgecolor="black", linewidth=0.6, zorder=6))
-    places, numbers, power = _ticks(scale, end - left)
-    for place, word in zip(left + (end - left) * places / scale, numbers, strict=True):
-        pen.line(np.array([(place, lower), (place, lower - 3 * POINT)]), width=0.6, colour="black")
-        pen.write(place, lower - 5 * POINT, word, _TICK_SIZE, color="black", ha="center", va="top")
-    if power:
-        pen.write(right + 0.16, lower - 5 * POINT, power, 8, color="black", va="top")
+    extend = "max" if above.any() else "neither"
+    bar = pen.colour_bar(scale, left, top - 0.5 * _BAR_HEIGHT, right - left, _BAR_HEIGHT, extend=extend)
+    bar.formatter.set_powerlimits((-3, 4))
+    bar.ax.locator_params("x", nbins=int(np.clip((right - left) / 0.45, 1, 9)), steps=[1, 2, 2.5, 5, 10])
     total = float(areas.sum())
     if above.any() and total > 0.0:
         share = float(areas[above].sum()) / total
         percent = f"{100 * share:.1f} %" if share >= 0.001 else "under 0.1 %"
         text = f"clipped: {percent} of the area\nis above, up to {density.max():.3g} J/m²"
-        pen.write(right + 0.12, 0.5 * (lower + upper), text, 7.5, color=GREY, linespacing=1.35)
+        pen.write(right + 0.12, top, text, _CAPTION_SIZE, color=GREY, linespacing=1.35)
 
 
-def _ticks(scale: float, length: float) -> tuple[FloatArray, list[str], str]:
-    """Return round values from 0 to `scale` for a bar of this length [in], their words, and their power of ten."""
-    most = int(np.clip(length / (5.0 * _TICK_SIZE * POINT), 1, 9))
-    values = np.asarray(MaxNLocator(nbins=most, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, scale))
-    values = values[values <= scale * (1.0 + 1e-9)]
-    formatter = ScalarFormatter()
-    formatter.create_dummy_axis()
-    formatter.axis.set_view_interval(0.0, scale)  # type: ignore[union-attr]
-    formatter.set_powerlimits((-3, 4))
-    words = formatter.format_ticks(values)  # type: ignore[arg-type]
-    return values, words, formatter.get_offset()
+@dataclass(kw_only=True, eq=False)
+class _Cell:
+    """One piece on the page: its name, captions, views, and its place from `left` to the right and from `top` down [in].
+
+    Views that are `stacked` stand one below the other. It is `narrowest` at least.
+    """
+
+    name: str
+    captions: dict[str, str]
+    colours: FloatArray
+    views: dict[str, View]
+    datum: str | None
+    grain_angle: float
+    narrowest: float = _NARROWEST
+    stacked: bool = False
+    caption_lines: list[str] = field(default_factory=list)
+    inches_per_metre: float = 1.0
+    left: float = 0.0
+    top: float = 0.0
+    width: float = 0.0
+    height: float = 0.0
+
+    @property
+    def pattern(self) -> View:
+        """The flat one of its views."""
+        return list(self.views.values())[-1]
+
+    @property
+    def rows(self) -> list[dict[str, View]]:
+        """The views that stand side by side, row by row."""
+        return [{title: view} for title, view in self.views.items()] if self.stacked else [self.views]
+
+    @property
+    def extent(self) -> FloatArray:
+        """Width and height of all views together [m]."""
+        sizes = np.array([view.size[:2] for view in self.views.values()])
+        across, down = (
+            (sizes.max(axis=0), sizes.sum(axis=0)) if self.stacked else (sizes.sum(axis=0), sizes.max(axis=0))
+        )
+        return np.array([max(float(across[0]), 1e-9), max(float(down[1]), 1e-9)])
+
+    @property
+    def beside(self) -> float:
+        """Room for names at both sides of all views side by side [in]."""
+        return 2 * _BESIDE * len(self.rows[0])
+
+    @property
+    def largest_scale(self) -> float:
+        """The largest scale on a page [in/m]."""
+        tallest = _TALLEST_PIECE * (1.5 if self.stacked else 1.0)
+        return float(min((_ROOM - self.beside) / self.extent[0], tallest / self.extent[1]))
+
+    def fit(self, pen: Pen, scale: float) -> None:
+        """Choose scale [in/m], size and captions; a piece that would become too small to read is drawn larger."""
+        widest = (_ROOM - self.beside) / float(self.extent[0])
+        readable = _SMALLEST_PATTERN / max(float(self.pattern.size[:2].max()), 1e-9)
+        self.inches_per_metre = max(scale, min(widest, readable))
+        self.name = pen.shorten(self.name, _TITLE_SIZE, _LONGEST_NAME, "bold")
+        named = pen.measure(self.name, _TITLE_SIZE, "bold")[0] + 0.15
+        wide, high = self.inches_per_metre * self.extent
+        self.width = max(float(wide) + self.beside, self.narrowest, named)
+        # The captions are lines that end within the cell.
+        width, height = self.pattern.size[:2]
+        factor, word = (100, "cm") if max(width, height) >= 0.00999 else (1000, "mm")
+        self.caption_lines, room = list[str](), 0.0
+        for key, value in {"pattern": f"{factor * width:.1f} × {factor * height:.1f} {word}", **self.captions}.items():
+            entry = pen.shorten(f"{key} {value}", _CAPTION_SIZE, self.width - 0.1)
+            taken = pen.measure(entry, _CAPTION_SIZE)[0]
+            gap = pen.measure(_BETWEEN, _CAPTION_SIZE)[0]
+            if self.caption_lines and gap + taken < room:
+                self.caption_lines[-1] += _BETWEEN + entry
+                room -= gap + taken
+            else:
+                self.caption_lines.append(entry)
+                room = self.width - 0.1 - taken
+        self.height = self.head + float(high) + len(self.rows) * _FOOT + (len(self.rows) - 1) * _HEADING
+
+    @property
+    def words(self) -> float:
+        """How far name and captions reach down [in]."""
+        return 0.28 + _LINE * len(self.caption_lines)
+
+    @property
+    def head(self) -> float:
+        """How far the views are below the upper edge [in]."""
+        return self.words + (_HEADING if len(self.views) > 1 else _NAMED)
+
+
+def _cell(piece: PicturePiece, title: str, scale: Scale, *, shows_body: bool) -> _Cell:
+    """Return the cell of a piece, with its views."""
+    faces = np.asarray(piece.faces, dtype=np.int32)
+    in_plane, views = make_facets(faces), dict[str, View]()
+    if shows_body:
+        in_space = piece.surface.lines if piece.surface_lines is None else piece.surface_lines
+        on_body = in_plane if np.array_equal(faces, piece.surface.faces) else make_facets(piece.surface.faces)
+        views["on the body"] = surface_view(piece.surface, on_body, polylines_of(in_space))
+    positions = np.asarray(piece.positions, dtype=np.float64)
+    views["pattern" if shows_body else ""] = pattern_view(positions, in_plane, polylines_of(piece.lines))
+    colours = scale.rgb(np.asarray(piece.face_energy_density, dtype=np.float64))
+    cell = _Cell(
+        name=title, captions=dict(piece.captions), colours=colours, views=views,
+        datum=piece.datum, grain_angle=piece.grain_angle,
+    )  # fmt: skip
+    width, height = cell.extent
+    cell.stacked = shows_body and float(width) > _STACKED * float(height)
+    return cell
+
+
+class _Band:
+    """The garment on its mannequin, seen from three sides, across the page."""
+
+    def __init__(
+        self, body: Body, pieces: Sequence[PicturePiece], drafted: Sequence[DraftedOutline], scale: Scale
+    ) -> None:
+        flattened, others = [piece.surface for piece in pieces], [surface for each in drafted for surface in each.worn]
+        surfaces = [*flattened, *others]
+        counts = np.cumsum([0, *(len(surface.vertices) for surface in surfaces)])
+        faces = [
+            np.where(surface.faces >= 0, surface.faces + first, -1)
+            for surface, first in zip(surfaces, counts, strict=False)
+        ]
+        worn = np.concatenate([surface.vertices for surface in surfaces])
+        points, facets, skin = dress(body, worn, np.concatenate(faces).astype(np.int32))
+        self._views = {title: view_from_side(points, facets, degrees) for title, degrees in SIDES}
+        for view in self._views.values():
+            view.points[: len(worn), 2] += _NEARER
+            view.points[counts[len(flattened)] : len(worn), 2] += _OVER
+        density = np.concatenate([np.asarray(piece.face_energy_density, dtype=np.float64) for piece in pieces])
+        plain = np.tile(DRAFTED_CLOTH, (sum(len(surface.faces) for surface in others), 1)), np.tile(SKIN, (skin, 1))
+        self._colours = np.concatenate([scale.rgb(density), *plain])
+        # What the body shows of drafted pieces, and which lie within the garment.
+        within = dict.fromkeys(each.name.partition(", ")[0] for each in drafted if not each.worn)
+        words = ["grey: drafted for its edges, laid by its seams"] if others else []
+        self._words = "; ".join([*words, *([f"not shown on the body: {', '.join(within)}"] if within else [])])
+        self._width = sum(float(view.size[0]) for view in self._views.values())
+        self._tallest = max(float(view.size[1]) for view in self._views.values())
+        self.area = sum(view.area for view in self._views.values())
+        self._gaps = len(SIDES) * _BAND_GAP
+        self.largest_scale = min((_ROOM - self._gaps) / self._width, _BAND_TALLEST / self._tallest)
+        self.scale, self.room = self.largest_scale, 0.0
+
+    def size(self, scale: float) -> tuple[float, float]:
+        """Return width and height [in] at a scale [in/m]."""
+        return min(self._width * scale + self._gaps, _ROOM), _BAND_HEAD + self._tallest * scale + _BAND_FOOT
+
+    def draw(self, pen: Pen, left: float, top: float) -> None:
+        """Draw the views at the chosen scale across the chosen room, with their upper left corner at (`left`, `top`) [in]."""
+        gap = (self.room - self._width * self.scale) / len(SIDES)
+        bottom = top - _BAND_HEAD - self._tallest * self.scale
+        draw_row(
+            pen, self._views, [self._colours] * len(SIDES),
+            left=left + 0.5 * gap, bottom=bottom, inches_per_metre=self.scale, gap=gap,
+        )  # fmt: skip
+        pen.write(left, bottom - 0.16, self._words, _NAME_SIZE, color=GREY)
+
+
+def _lay_out(pen: Pen, cells: Sequence[_Cell], band: _Band | None) -> tuple[float, float, float]:
+    """Choose the scale and the place of each piece, from the upper left corner; return width and height of the page, and the scale [in/m].
+
+    All pieces have the same scale, so that they can be compared; only one that would become too small to read is
+    drawn larger. A garment on its body comes first, at a scale of its own. The scales are those that leave least of the page empty.
+    """
+    tallest = _TALLEST if band is None else _TALLEST_WORN
+    own_order = list(range(len(cells)))
+    by_height = sorted(own_order, key=lambda k: -float(cells[k].extent[1]))
+    found = []
+    for stacked in (False, True) if len(cells) == 1 and len(cells[0].views) > 1 else (None,):
+        if stacked is not None:  # one piece alone
+            cells[0].stacked = stacked
+        for scale in (
+            min(cell.largest_scale for cell in cells) * _SCALES[: 1 if band is None and len(cells) == 1 else None]
+        ):
+            for cell in cells:
+                cell.fit(pen, scale)
+            covered = sum(cell.inches_per_metre**2 * view.area for cell in cells for view in cell.views.values())
+            for share in _BAND_SCALES if band is not None else (0.0,):
+                large = 0.0 if band is None else share * band.largest_scale
+                shown = covered + (0.0 if band is None else band.area * large**2)
+                first = [] if band is None else [band.size(large)]
+                for order, pack in ((own_order, pack_rows), (by_height, pack_boxes)):
+                    places, wide, tall = pack([*first, *((cells[k].width, cells[k].height) for k in order)], _ROOM)
+                    wide = max(wide, _NARROWEST_PAGE - 2 * MARGIN)
+                    empty = _REORDERED * (order is by_height) - shown / ((wide + 2 * MARGIN) * (tall + _STRIP))
+                    found.append((max(0.0, tall - tallest), empty, stacked, scale, large, order, places, wide, tall))
+    _, _, stacked, scale, large, order, places, wide, tall = min(found, key=lambda each: each[:2])
+    if band is not None:
+        # Gaps fill the width unless pieces stand beside it.
+        own_width, own_height = band.size(large)
+        band.scale, band.room = large, own_width if any(top < own_height for _, top in places[1:]) else wide
+        places = places[1:]
+    for k, (left, top) in zip(order, places, strict=True):
+        cells[k].stacked = cells[k].stacked if stacked is None else stacked
+        cells[k].fit(pen, scale)
+        cells[k].left, cells[k].top = MARGIN + left, top
+    return wide + 2 * MARGIN, tall, float(scale)
+
+
+def _draw_cell(pen: Pen, cell: _Cell, top: float, page_scale: float) -> None:
+    """Draw a piece.
+
+    Args:
+        pen: of the page.
+        cell: with its place.
+        top: where the cells begin [in].
+        page_scale: of lengths, that of most pieces [in/m].
+    """
+    top -= cell.top
+    pen.write(cell.left, top - 0.13, cell.name, _TITLE_SIZE, fontweight="bold")
+    for index, text in enumerate(cell.caption_lines):
+        pen.write(cell.left, top - 0.32 - _LINE * index, text, _CAPTION_SIZE, color=GREY)
+    size, shown, bottom = cell.inches_per_metre, list[DrawnView](), top - cell.head
+    for row in cell.rows:
+        sizes = size * np.array([view.size[:2] for view in row.values()])
+        bottom -= float(sizes[:, 1].max())
+        gap = (cell.width - float(sizes[:, 0].sum())) / len(row)
+        left, colours = cell.left + 0.5 * gap, [cell.colours] * len(row)
+        shown += draw_row(pen, row, colours, left=left, bottom=bottom, inches_per_metre=size, gap=gap, above=0.26)
+        bottom -= _FOOT + _HEADING
+    room = LabelRoom()
+    room.take_box(cell.left, top - cell.words, cell.left + cell.width, top)
+    for drawn, words in zip(shown, cell.views, strict=True):
+        x, y, half = 0.5 * (drawn.box[0] + drawn.box[2]), drawn.box[3], 0.5 * pen.measure(words, 9)[0]
+        room.take_box(x - half, y + 0.18, x + half, y + 0.34)
+    floor, start = top - cell.height + 0.02, cell.left
+    if size != page_scale:
+        end = pen.scale_bar(cell.left, floor, size)
+        room.take_box(cell.left, floor, end, floor + 0.08)
+        start = end + 0.15
+    datum = cell.pattern.lines.get(cell.datum, [None])[0] if cell.datum is not None else None
+    has_grain = datum is None or _grain(pen, room, shown[-1], datum, cell.grain_angle)
+    unnamed: dict[str, None] = {}
+    # Left, bottom, right and upper edge of the room for the names of each view [in].
+    right, boxes = cell.left + cell.width, [view.box for view in shown]
+    if cell.stacked:
+        pages = [(cell.left, max(box[1] - _FOOT, floor), right, box[3] + 0.2) for box in boxes]
+    else:
+        sides = pairwise([cell.left, *(0.5 * (a[2] + b[0]) for a, b in pairwise(boxes)), right])
+        pages = [(begin, floor, end, box[3] + 0.2) for (begin, end), box in zip(sides, boxes, strict=True)]
+    for drawn, page in zip(shown, pages, strict=True):
+        others = [other for other in shown if other is not drawn]
+        unnamed |= dict.fromkeys(draw_lines(pen, room, drawn, cell.datum, page, others))
+    if not has_grain and datum is not None and not _grain(pen, room, shown[-1], datum, cell.grain_angle, pages[-1]):
+        unnamed["grain"] = None
+    # Which names had no room stands at the foot, between names that stand there; their number where there is little room.
+    all_names = ", ".join(unnamed)
+    texts = (
+        f"not labelled for want of room: {all_names}",
+        pen.shorten(f"not labelled: {all_names}", 7, right - start - 0.1),
+        f"not labelled: {len(unnamed)}",
+    )
+    for text in texts if unnamed else ():
+        width, height = pen.measure(text, 7)
+        places = np.arange(start, right - width - 0.1 + 1e-6, 0.1) + 0.5 * width
+        spots = [Spot(x=x, y=floor + 0.04, angle=0.0) for x in places.tolist()]
+        if spot := room.place(spots, width, height, (start - 0.1, floor - 0.1, right + 0.1, floor + 0.3)):
+            pen.write(spot.x, spot.y, text, 7, color=GREY, ha="center")
+            break
+
+
+def _grain(
+    pen: Pen,
+    room: LabelRoom,
+    drawn: DrawnView,
+    datum: IntArray,
+    grain_angle: float,
+    page: tuple[float, float, float, float] | None = None,
+) -> bool:
+    """Draw a grain arrow, turned by `grain_angle` degrees from the datum line; return False if there is no room.
+
+    It lies on the pattern, or beside it where a `page` is given, within which it stays [in].
+    """
+    line = drawn.to_page(drawn.view.points[datum])
+    along = line[-1] - line[0]
+    length = float(np.linalg.norm(along))
+    if not length > 0.0:
+        return True
+    turn = np.radians(grain_angle)
+    along = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]) @ (along / length)
+    along *= 1.0 if along[1] >= 0 else -1.0
+    across = np.array([along[1], -along[0]])
+    text_width, text_height = pen.measure("grain", LABEL_SIZE)
+    if page is None:
+        place = _grain_inside(drawn, 0.5 * (line[0] + line[-1]), along, across, length, text_height)
+    else:
+        angle = float(np.arctan2(along[1], along[0]))
+        left, bottom, right, top = drawn.box
+        spots = [
+            Spot(x=x, y=bottom + share * (top - bottom), angle=angle)
+            for x in (right + 0.25, left - 0.2, right + 0.45, right + 0.9)
+            for share in (0.5, 0.25, 0.75, 0.1, 0.9)
+        ]
+        free = room.place(spots, 0.8, 0.35, page)
+        place = None if free is None else (np.array([free.x - 0.05, free.y]), 0.35)
+    if place is None:
+        return False
+    centre, half = place
+    ends = np.array([centre - half * along, centre + half * along])
+    pen.arrow(ends, width=1.3, colour=GRAIN, head=5.5, halo=True)
+    room.take_line(ends, 0.12)
+    middle = centre + across * (0.5 * text_height + 0.07)
+    angle = float(np.degrees(np.arctan2(along[1], along[0])))
+    options = {"ha": "center", "rotation": angle, "rotation_mode": "anchor", "color": GRAIN}
+    pen.write(float(middle[0]), float(middle[1]), "grain", LABEL_SIZE, halo=True, **options)
+    room.take_line(middle + np.array([[-0.5], [0.5]]) * text_width * along, text_height)
+    return True
+
+
+def _grain_inside(
+    drawn: DrawnView,
+    middle: FloatArray,
+    along: FloatArray,
+    across: FloatArray,
+    length: float,
+    text_height: float,
+) -> tuple[FloatArray, float] | None:
+    """Return the middle of the arrow and half its length [in], where it lies on the cloth; None if nowhere."""
+    left, bottom, right, top = drawn.box
+    width = abs(float(across[0])) * (right - left) + abs(float(across[1])) * (top - bottom)
+    for half in (0.2 * length, 0.12 * length, _SHORTEST_GRAIN):
+        for shift in (0.0, 0.15, -0.15, 0.3, -0.3):
+            for aside in (0.12, -0.12, 0.2, -0.2, 0.3, -0.3, 0.42, -0.42):
+                centre = middle + shift * length * along + aside * width * across
+                run = centre + np.linspace(-half, half, 15)[:, None] * along
+                margin = 0.10
+                edges = np.concatenate([run - margin * across, run + (margin + text_height) * across])
+                if half >= _SHORTEST_GRAIN and drawn.covers(edges).all():
+                    return centre, half
+    return None
+
+
+class _DraftedRows:
+    """Drafted outlines in rows, longer side across.
+
+    Attributes:
+        height: of all rows [in].
+    """
+
+    def __init__(self, pen: Pen, pieces: Sequence[DraftedOutline], width: float, page_scale: float) -> None:
+        """Lay the pieces out in a width [in]; where the longest does not fit at the page's scale [in/m], all are drawn smaller."""
+        outlines = []
+        for piece in pieces:
+            wide, high = np.ptp(piece.points, axis=0)
+            points = piece.points if wide >= high else np.column_stack([piece.points[:, 1], -piece.points[:, 0]])
+            outlines.append(points - [points[:, 0].min(), points[:, 1].max()])
+        self._scale = min(page_scale, (width - _GAP) / max(float(np.ptp(points[:, 0])) for points in outlines))
+        self._is_smaller = self._scale < page_scale * (1.0 - 1e-9)
+        self._names = [piece.name for piece in pieces]
+        self._outlines = [self._scale * points for points in outlines]
+        sizes = list[tuple[float, float]]()
+        for name, points in zip(self._names, self._outlines, strict=True):
+            wide, high = np.ptp(points, axis=0).tolist()
+            # A name that is wider than the page is shortened where it is written.
+            sizes.append((min(max(wide, pen.measure(name, _NAME_SIZE)[0]) + _GAP, width), high + _NAME + _GAP))
+        self._places, _, tall = pack_rows(sizes, width)
+        self.height = tall + _ROWS_HEADING
+
+    def draw(self, pen: Pen, left: float, top: float) -> None:
+        """Draw the rows with their upper left corner at (`left`, `top`) [in]."""
+        heading = "drafted for the edges that they are sewn to"
+        pen.write(left, top - 0.14, heading, _WORDS_SIZE, color=GREY, fontstyle="italic")
+        if self._is_smaller:
+            pen.scale_bar(left + pen.measure(heading, _WORDS_SIZE)[0] + 0.25, top - 0.17, self._scale)
+        for name, points, (across, down) in zip(self._names, self._outlines, self._places, strict=True):
+            y = top - _ROWS_HEADING - down
+            pen.write(left + across, y - 0.5 * _NAME, name, _NAME_SIZE)
+            corner = np.array([left + across, y - _NAME])
+            pen.polygon(corner + points, facecolor=_CLOTH, edgecolor=INK, linewidth=0.8, zorder=3)

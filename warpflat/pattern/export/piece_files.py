@@ -13,9 +13,8 @@ from warpflat.pattern.export.obj import write_obj
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from warpflat.pattern.export.picture import PicturePiece
-    from warpflat.pattern.export.picture_drafted import DraftedOutline
-    from warpflat.pattern.export.picture_garment import Body
+    from warpflat.pattern.export.dressed import Body
+    from warpflat.pattern.export.picture import DraftedOutline, PicturePiece
 
 __all__ = ["picture_piece", "plot", "save_piece", "write_pieces"]
 
