@@ -24,6 +24,7 @@ from scipy.sparse import coo_array, csc_array, csr_array, diags_array, vstack
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import record
 from warpflat.core.sparse import factor_symmetric
+from warpflat.core.vectors import unit
 from warpflat.flat.fabric.fabric import grain_axes
 from warpflat.flat.model.network import CellModel, SpringNetwork
 from warpflat.flat.solver.collapse import iterate_coarsenings
@@ -353,11 +354,11 @@ def equation_rows(network: SpringNetwork, positions: FloatArray) -> csr_array:
     ends, kind = seams.ends.numpy().reshape(-1, 4), seams.kind.numpy()
     gradient = np.array(seams.coefficient.numpy()).reshape(-1, 4, 2) * (kind == LINEAR)[:, None, None]
     x = positions[ends]
-    first, second = _unit(x[:, 1] - x[:, 0]), _unit(x[:, 3] - x[:, 2])
+    first, second = unit(x[:, 1] - x[:, 0]), unit(x[:, 3] - x[:, 2])
     ratio = seams.ratio.numpy()[:, None]
     of_lengths = np.stack([-first, first, ratio * second, -ratio * second], axis=1)
     chord = x[:, 2] - x[:, 1]
-    u = _unit(chord)
+    u = unit(chord)
     across = np.stack([-u[:, 1], u[:, 0]], axis=1)
     share = np.einsum("ij,ij->i", x[:, 0] - x[:, 1], u) / np.maximum(np.linalg.norm(chord, axis=1), 1e-300)
     of_line = np.stack(
@@ -372,10 +373,6 @@ def equation_rows(network: SpringNetwork, positions: FloatArray) -> csr_array:
     )
     rows.sum_duplicates()
     return rows
-
-
-def _unit(vectors: FloatArray) -> FloatArray:
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None])
 
 
 def _turned(vectors: FloatArray) -> FloatArray:

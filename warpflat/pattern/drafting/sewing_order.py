@@ -8,7 +8,7 @@ closes a ring, panels of one side of the body before its halves, and these befor
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
@@ -21,7 +21,7 @@ from warpflat.core import other_side, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.pieces import Seam, SeamOpening, SeamSide
 from warpflat.pattern.drafting.seam_words import joint_words
-from warpflat.pattern.drafting.sewing_tasks import BANDS, GATHERED, Place, SewingTasks, Task, pieces_of, techniques
+from warpflat.pattern.drafting.sewing_tasks import GATHERED, Place, SewingTasks, Task, pieces_of, techniques
 from warpflat.pattern.drafting.words import translate, translate_name
 
 __all__ = [
@@ -36,9 +36,6 @@ __all__ = [
 
 #: A corner of a piece of cloth: its name, whether it is turned over, its copy, and the number of the edge that begins there.
 Corner = tuple[str, bool, int, int]
-
-#: Techniques whose seams and edges each have a step of their own.
-_ALONE = ("invisible_zip", "lapped_zip", "fly", "vent", "slit", "buttoned", "casing", "elastic_band", "buttonholes")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,11 +170,9 @@ def notions(garment: DraftedGarment, size: str) -> tuple[str, ...]:
 
 def tools(garment: DraftedGarment, size: str) -> str:
     """Return what the garment is made with, in words."""
-    used = {step.technique for step in sewing_steps(garment, size)}
+    used = {techniques()[step.technique].get("tool") for step in sewing_steps(garment, size)}
     needed = ["paper scissors and glue or tape", "cloth scissors", "tape measure", "chalk", "pins", "iron"]
-    needed += ["sewing machine", "hand needle"]
-    needed += ["zip foot"] if used & {"invisible_zip", "lapped_zip", "fly"} else []
-    needed += ["buttonhole foot"] if used & {"buttonholes", "end_button"} else []
+    needed += ["sewing machine", "hand needle", *(tool for tool in ("zip foot", "buttonhole foot") if tool in used)]
     if garment.garment.worn is not None and garment.garment.worn.knits:
         needed.append("needle and stitch for knits")
     return ", ".join(translate(word) for word in needed)
@@ -255,14 +250,14 @@ class _Workshop(SewingTasks):
                 longest = max((each.length for each in seam.openings if each.kind == "zip"), default=0.0)
                 if longest > 1e-3 * self.lengths.get(seam.name, (1e6, 0.0))[0] + 1e-3:
                     at_zip = [corner for pair in self._ends(seam) for corner in pair]
-                    bands = {each for corner in at_zip for each, _ in beside[corner] if each.technique in BANDS}
+                    bands = {each for corner in at_zip for each, _ in beside[corner] if each.how.get("lengthens")}
                     task.needs |= bands
                     for band in bands:
                         band.needs.discard(task)
                     task.pieces = pieces_of(place for band in bands for place in band.uses)
         # What is hemmed, bound or faced along edges is sewn when the seams are that end between these.
         for task in self.tasks:
-            if task.turn < 40 or task.seams:
+            if task.how["turn"] < 40 or task.seams:
                 continue
             reached = {(p, (self.order[p].index(e) + k) % len(self.order[p])) for p, e in task.uses for k in (0, 1)}
             for joint, crossing in ends.items():
@@ -303,7 +298,7 @@ class _Workshop(SewingTasks):
         def shape(task: Task) -> tuple[int, bool, bool, bool, bool]:
             """Return the turn of a task; of a seam whether it is eased, closes a ring, joins left and right, and front and back."""
             if task.technique not in ("", "lining_join"):
-                return task.turn, False, False, False, False
+                return task.how["turn"], False, False, False, False
             seam = task.seams[0]
             first, second = ((row[0].piece, row[0].mirrored, row[0].copy) for row in seam.sides)
             closes = cloth.get(first, first) == cloth.get(second, second)
@@ -313,7 +308,7 @@ class _Workshop(SewingTasks):
                 for part in (first, second)
             ]
             differ = faces[0] != faces[1] and all(map(any, faces))
-            return task.turn, 5e-4 < abs(seam.ease) < GATHERED, closes, centre, differ
+            return task.how["turn"], 5e-4 < abs(seam.ease) < GATHERED, closes, centre, differ
 
         def meet(one: Corner, other: Corner) -> bool:
             return one == other or frozenset((one, other)) in whole
@@ -355,7 +350,7 @@ class _Workshop(SewingTasks):
         while ready:
             first = min(ready, key=key)
             how, alike, batch = technique(first), shape(first), [first]
-            line = set[Task]()
+            line, alone = set[Task](), techniques()[how].get("alone", False)
             while True:
                 task = batch[-1]
                 line.update(() if task.technique else line_of(task)[0])
@@ -366,13 +361,11 @@ class _Workshop(SewingTasks):
                     names = {cloth.get(part, part) for part in parts}
                     cloth |= dict.fromkeys(parts, parts[0])
                     cloth = {part: parts[0] if name in names else name for part, name in cloth.items()}
-                more = [
-                    t for t in ready if t in line or (how not in _ALONE and technique(t) == how and shape(t) == alike)
-                ]
+                more = [t for t in ready if t in line or (not alone and technique(t) == how and shape(t) == alike)]
                 if not more:
                     break
                 batch.append(min(more, key=key))
-            if found and found[-1][0] == how and how not in _ALONE:
+            if found and found[-1][0] == how and not alone:
                 found[-1][1].extend(batch)
             else:
                 found.append((how, batch))
@@ -401,28 +394,41 @@ class _Workshop(SewingTasks):
             _letter(len(set(self.letters.values()))) if task.like is None else self.letters[task.like.seams[0].name]
         )
         self.letters |= {each.name: letter for each in group}
-        # Seams called by their pieces have numbers from the second on; those of facings are said by their pieces, too.
+        # Seams called by their pieces have numbers from the second on; those of facings, and of equal pieces between others, are said
+        # by theirs, too.
         by_pieces = re.sub(r" \d+$", "", seam.name) == joint_words(seam) or task.technique == "facing_join"
-        name = translate_name(without_side(seam.name) if sideless else seam.name) if not by_pieces else ""
-        first, second = (_words(row, self.titles) for row in seam.sides)
-        if by_pieces:
-            name = translate(
-                "{first} to {second}" if first != second else "seam of the {first}", first=first, second=second
+        copied = any(part.copy for each in group for row in each.sides for part in row)
+        equal = copied and len({part.piece for each in group for row in each.sides for part in row}) > 2
+        by_pieces = by_pieces or equal
+        first, second = (self._words([each.sides[k] for each in (group if equal else group[:1])]) for k in (0, 1))
+        if not by_pieces:
+            name = translate_name(without_side(seam.name) if sideless else seam.name)
+        else:
+            words = "{first} to {second}" if first != second else "seam of the {first}"
+            name = translate(words, first=first, second=second)
+        return [
+            SewnSeam(
+                letter=letter,
+                name=name,
+                sides=(first, second),
+                length_mm=self.lengths.get(seam.name, (0.0, 0.0)),
+                ease=seam.ease,
+                held=held,
+                by_pieces=by_pieces,
+                lined=task.technique == "lining_join",
+                count=max(len(group), 2 if sideless else 1),
+                openings=seam.openings,
+                places=tuple(places),
             )
-        made = SewnSeam(
-            letter=letter,
-            name=name,
-            sides=(first, second),
-            length_mm=self.lengths.get(seam.name, (0.0, 0.0)),
-            ease=seam.ease,
-            held=held,
-            by_pieces=by_pieces,
-            lined=task.technique == "lining_join",
-            count=max(len(group), 2 if sideless else 1),
-            openings=seam.openings,
-            places=tuple(places),
-        )
-        return [made]
+        ]
+
+    def _words(self, rows: Iterable[Sequence[SeamSide]]) -> str:
+        """Return the pieces of each row once: those in a row are sewn to each other before."""
+        found: dict[frozenset[str], str] = {}
+        for row in rows:
+            titles = dict.fromkeys(self.titles[part.piece] for part in row)
+            found.setdefault(frozenset(titles), " + ".join(titles))
+        return ", ".join(found.values())
 
 
 def _letter(number: int) -> str:
@@ -433,7 +439,3 @@ def _letter(number: int) -> str:
         number, digit = divmod(number - 1, 26)
         letters = ascii_uppercase[digit] + letters
     return letters
-
-
-def _words(side: Sequence[SeamSide], titles: Mapping[str, str]) -> str:
-    return " + ".join(dict.fromkeys(titles[part.piece] for part in side))

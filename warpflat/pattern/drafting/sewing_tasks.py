@@ -15,37 +15,10 @@ from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.drafting.words import listed, translate, translate_name
 
-__all__ = ["BANDS", "GATHERED", "Place", "SewingTasks", "Task", "is_flounce", "piece_titles", "pieces_of", "techniques"]
+__all__ = ["GATHERED", "Place", "SewingTasks", "Task", "is_flounce", "piece_titles", "pieces_of", "techniques"]
 
 #: A piece and an edge of it, by their names.
 Place = tuple[str, str]
-#: Techniques by the roles of the pieces on both sides of a seam; those of the shell alone follow from the garment.
-_BY_ROLES: tuple[tuple[set[str], str], ...] = (
-    ({"facing"}, "facing_join"),
-    ({"facing", "shell"}, "facing"),
-    ({"lining"}, "lining_join"),
-    ({"facing", "lining"}, "lined_edge"),
-    ({"strip"}, "strip_join"),
-    ({"waistband"}, "strip_join"),
-    ({"strip", "shell"}, "strip"),
-    ({"waistband", "shell"}, "waistband"),
-    ({"strip", "waistband"}, "waistband"),
-    ({"cuff"}, "cuff"),
-    ({"cuff", "shell"}, "cuff"),
-    ({"hood"}, "hood_join"),
-    ({"hood", "shell"}, "hood"),
-    ({"collar"}, "collar"),
-    ({"collar", "shell"}, "collar_on"),
-    ({"pocket"}, "pocket_rim"),
-    ({"pocket", "shell"}, "pocket_opening"),
-)
-#: Techniques that sew a strip, a band or a collar to the garment, and use up its other edges.
-_ON = (
-    *("rib", "binding", "ruffle", "waistband_ends", "waistband_ring", "waistband_layers", "cuff", "hood"),
-    *("collar_on", "collar_stand_on", "collar_between", "collar_under_facing", "facing", "stand_and_fall", "collar"),
-)
-#: Those of them that lengthen an edge.
-BANDS = ("rib", "waistband_ends")
 #: How the edges of a facing that is grown on begin, which lie beyond the line on which it is folded.
 _GROWN_ON = "facing "
 # What is longer by more than this share is gathered; less is eased in.
@@ -54,7 +27,7 @@ GATHERED = 0.15
 
 @functools.cache
 def techniques() -> Mapping[str, Mapping[str, Any]]:
-    """Return what things are sewn by: the turn, the text and the drawing of each technique."""
+    """Return what things are sewn by, each technique as `data/techniques.toml` describes it."""
     with resources.as_file(resources.files("warpflat.pattern.drafting") / "data/techniques.toml") as path:
         return read_toml(path)
 
@@ -91,8 +64,9 @@ class Task:
         return [(side.piece, side.edge) for seam in self.seams for row in seam.sides for side in row]
 
     @property
-    def turn(self) -> int:
-        return int(techniques()[self.technique or "flat"]["turn"])
+    def how(self) -> Mapping[str, Any]:
+        """Its technique, as :func:`techniques` describes it."""
+        return techniques()[self.technique or "flat"]
 
 
 def piece_titles(pieces: Sequence[Piece]) -> dict[str, str]:
@@ -185,18 +159,18 @@ class SewingTasks:
         if not any(set(row) == {"pocket"} for row in rows):
             # What of a pocket lies in another seam is sewn with that.
             roles -= {"pocket"}
-        technique = next((technique for known, technique in _BY_ROLES if known == roles), "")
+        technique = next((name for name, each in techniques().items() if sorted(roles) in each.get("joins", ())), "")
         joined = [self.pieces[side.piece] for row in seam.sides for side in row]
         strips = [piece for piece in joined if piece.role in ("strip", "waistband")]
         folded = any("fold line" in strip.internal_lines for strip in strips)
         if technique == "strip_join" and (len(group) > 1 or any(side.copy for row in seam.sides for side in row)):
             return "panel_join"
-        if technique == "strip":
+        if technique == "binding":
             hemmed = any(edge.kind == "hem" for strip in strips for edge in strip.edges)
             return "ruffle" if hemmed else "rib" if folded else "binding"
-        if technique == "waistband":
+        if technique == "waistband_layers" and folded:
             ring = any({side.piece for row in each.sides for side in row} == {strips[0].name} for each in self.seams)
-            return ("waistband_ring" if ring else "waistband_ends") if folded else "waistband_layers"
+            return "waistband_ring" if ring else "waistband_ends"
         if technique == "collar":
             falls = [each for each in self.seams if self._is_fall(each)]
             stands = {side.piece for each in falls for side in each.sides[1]}
@@ -318,7 +292,9 @@ class SewingTasks:
         bags = [name for name in joined if role.get(name) == "pocket"]
         inseam = [place[0] for place in free if place[0] in bags and place[1] == "opening"]
         add("inseam_bag", inseam, of(inseam, ("cut",)))
-        self._use("pocket_rim", of(bags))
+        rims = [task for task in self.tasks if task.technique in ("pocket_rim", "inseam_rim", "pocket_opening")]
+        for place in of(bags):
+            next(task for task in rims if place[0] in pieces_of(task.sewn)).uses.append(place)
         straps = [
             name
             for name in loose
@@ -358,15 +334,15 @@ class SewingTasks:
         for task in self.tasks:
             edges = {without_side(edge) for piece, edge in task.sewn if role[piece] == "shell"}
             zipped |= edges if any(opening.kind == "zip" for seam in task.seams for opening in seam.openings) else set()
-            bound |= edges if task.technique in _ON and task.technique not in ("facing", "hood") else set()
+            bound |= edges if task.how.get("takes_edges") and task.technique not in ("facing", "hood") else set()
         inner = [name for name in role if role[name] in ("lining", "facing")]
         for technique, known in (("at_zip", zipped), ("baste_lining", bound)):
             places = [
                 (p, e) for (p, e), kind in free.items() if p in inner and kind == "seam" and without_side(e) in known
             ]
             add(technique, [], take(places))
-        open_seams = [task for task in self.tasks if task.technique == "lining_join" and task.seams[0].openings]
-        zips = [task for task in open_seams if any(each.kind == "zip" for each in task.seams[0].openings)]
+        linings = [task for task in self.tasks if task.technique == "lining_join"]
+        zips = [task for task in linings if any(each.kind == "zip" for each in task.seams[0].openings)]
         for task in self.tasks:
             if task.technique == "at_zip":
                 task.places = [place for each in zips for place in each.sewn]
@@ -386,9 +362,9 @@ class SewingTasks:
         for name in role:
             if role[name] in ("facing", "strip", "waistband", "cuff", "collar", "hood"):
                 places = [(p, e) for (p, e), kind in free.items() if p == name and kind != "hem"]
-                on = [t for t in self.tasks if t.technique in _ON and name in pieces_of(t.sewn)]
+                on = [t for t in self.tasks if t.how.get("takes_edges") and name in pieces_of(t.sewn)]
                 if on and places:
-                    max(on, key=lambda task: task.turn).uses.extend(take(places))
+                    max(on, key=lambda task: int(task.how["turn"])).uses.extend(take(places))
         # Vents and slits, in the shell and in its lining.
         for kind in ("vent", "slit"):
             own = [place for place in free if free[place] == "hem" and kind in place[1].split(" ")]
@@ -396,16 +372,9 @@ class SewingTasks:
                 found = [each for each in task.seams[0].openings if each.kind == kind]
                 sides = task.sewn
                 if found and role[sides[0][0]] != "lining":
-                    places = [(p, e) for p, e in own if (p, e.removesuffix(f" {kind}")) in sides]
-                    add(kind, [], take(places), length=length_words(found[0].length, units), of=task.seams)
-                    if not places:
-                        self.tasks.append(
-                            Task(
-                                technique=kind,
-                                values={"length": length_words(found[0].length, units), "of": task.seams},
-                            )
-                        )
-                    self.tasks[-1].needs.add(task)
+                    places = take([(p, e) for p, e in own if (p, e.removesuffix(f" {kind}")) in sides])
+                    values = {"length": length_words(found[0].length, units), "of": task.seams}
+                    self.tasks.append(Task(technique=kind, uses=places, values=values, needs={task}))
             lined = take([place for place in own if place in free and role[place[0]] == "lining"])
             add("lined_opening", [], lined, kind=translate(kind))
         for elastic in garment.garment.elastics:
@@ -483,16 +452,6 @@ class SewingTasks:
         bands = [p.name for p in drafted if p.piece.role == "waistband" and not _buttons_at_one_end(p)]
         if zipped and bands:
             self.tasks.append(Task(technique="hook", pieces=bands, notions=[translate("1 hook and bar")]))
-
-    def _use(self, technique: str, places: Sequence[Place]) -> None:
-        """Let the first task of a technique that is sewn at a piece use up its free edges."""
-        for place in places:
-            task = next(
-                t
-                for t in self.tasks
-                if t.technique in (technique, "inseam_rim", "pocket_opening") and place[0] in pieces_of(t.sewn)
-            )
-            task.uses.append(place)
 
 
 def is_flounce(piece: Piece) -> bool:
