@@ -554,3 +554,12 @@ def test_cloth_without_strain_has_no_scale_of_colours(tmp_path: Path) -> None:
     red = energy_colours(0.6, 1.0)
     assert near(none, red) == 0
     assert near(some, red) > 200
+
+
+def test_a_page_of_hundreds_of_pieces_has_fewer_pixels_per_inch() -> None:
+    pen = Pen(12.0, 4.0)
+    assert pen.dpi == 150.0
+    pen.resize(12.0, 300.0)
+    assert np.prod(pen.figure.get_size_inches() * pen.figure.dpi) == pytest.approx(2.4e7)
+    pen.resize(12.0, 8.0)
+    assert pen.figure.dpi == 150.0
