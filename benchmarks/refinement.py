@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat import Fabric, flatten
-from warpflat.app.scene.compare import laid_upon
+from warpflat.core.vectors import laid_upon
 from warpflat.flat.flattening.result import Flattening
 from warpflat.flat.solver.options import RelaxOptions
 from warpflat.flat.surface.shapes import make_shape

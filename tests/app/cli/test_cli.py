@@ -310,8 +310,8 @@ def test_units_are_asked_for_and_checked(command: Command):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--fabric", "demin"], "^command line: fabric: unknown fabric 'demin': did you mean 'denim'"),
-        (["--stretch-warp", "5"], "^command line: wear: stretch_warp = 5"),
+        (["--fabric", "demin"], "^--fabric: unknown fabric 'demin': did you mean 'denim'"),
+        (["--stretch-warp", "5"], "^--stretch-warp = 5"),
         (["--datum", "0,77"], "77"),
         (["--datum", "0,0"], "."),
         (["--datum", "botom"], "bottom"),
@@ -480,14 +480,14 @@ def test_a_mistake_found_late_is_one_line_in_a_fresh_process_too(tmp_path: Path)
         capture_output=True, text=True, check=False, cwd=tmp_path,
     )  # fmt: skip
     ended = Ended(result.returncode, result.stdout, result.stderr, frozenset())
-    assert ended.refusal.startswith("command line: device 'cuda:99'")
+    assert ended.refusal.startswith("--device 'cuda:99'")
 
 
 @pytest.mark.skipif(wp.is_cuda_available(), reason="this machine has a CUDA device")
 def test_a_machine_without_cuda_is_told_in_one_line(command: Command):
     Path("cloth.obj").write_text(SQUARE)
     told = command("flatten", "cloth.obj", "--units", "m", "--device", "cuda").refusal
-    assert told == "command line: device 'cuda' is not available; did you mean 'cpu'? valid: cpu"
+    assert told == "--device 'cuda' is not available; did you mean 'cpu'? valid: cpu"
 
 
 def test_memory_that_runs_out_is_one_line(command: Command, monkeypatch: pytest.MonkeyPatch):

@@ -53,18 +53,6 @@ def test_fabrics_are_compared_with_the_first(comparison: Comparison):
     assert distances["power-net"]["outline, most"] >= distances["power-net"]["bust start"] > 5e-3
 
 
-def test_a_layout_is_found_again_wherever_it_lies(comparison: Comparison):
-    from warpflat.app.scene.compare import laid_upon
-
-    target = comparison.layouts["denim"]["front"]
-    c, s = np.cos(2.0), np.sin(2.0)
-    np.testing.assert_allclose(laid_upon(target, target @ [[c, s], [-s, c]] + [3.0, -1.0]), target, atol=1e-12)
-    # A mirror image is another pattern: it is laid upon it as it is, and not turned over.
-    mirrored = laid_upon(target, target * [-1.0, 1.0])
-    a, b = mirrored[1] - mirrored[0], mirrored[17] - mirrored[0]
-    assert a[0] * b[1] - a[1] * b[0] < 0
-
-
 def test_stiffness_shows_as_the_cloth_has_it(comparison: Comparison):
     """Denim's weft is five times as stiff as its warp: it is strained less; the net gives both ways."""
     worn = {fabric: result["front"].measures["wear"] for fabric, result in comparison.results.items()}

@@ -18,10 +18,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import warpflat
-from warpflat.app.scene.compare import laid_upon
 from warpflat.app.scene.load import make_scene
 from warpflat.app.scene.run import run_scene
 from warpflat.core.errors import InputError
+from warpflat.core.vectors import laid_upon
 from warpflat.flat.fabric.fabric import Fabric
 from warpflat.flat.flattening.edit import change_fabric, change_surface
 from warpflat.flat.flattening.flatten_all import flatten_all

@@ -119,8 +119,10 @@ def test_a_skirt_hangs_from_the_waist_and_is_as_symmetric_as_it_is_drawn():
         lay([piece("a", shape), piece("b", shape)], seams, top="hop")
 
 
-def test_each_leg_goes_around_its_own():
-    front = [(0.0, 0.0), (0.2, 0.0), (0.22, 0.63), (0.2, 0.9), (0.0, 0.9)]
+@pytest.mark.parametrize("hem", [0.2, 0.36])
+def test_each_leg_goes_around_its_own(hem: float):
+    """Wide ones, too, whose hems would reach around both legs."""
+    front = [(0.0, 0.0), (hem, 0.0), (hem + 0.02, 0.63), (0.2, 0.9), (0.0, 0.9)]
     names = ("front left", "back left", "front right", "back right")
     # Each leg: the side seam, then the inside of the leg; the crotch joins both fronts and both backs.
     mirrored = [(-x, y) for x, y in front[::-1]]
@@ -138,7 +140,9 @@ def test_each_leg_goes_around_its_own():
     lines = limb_lines(body_of_size(30.0))
     for opening, limb in zip(openings, laid.limbs, strict=True):
         if limb:
-            assert abs(links(laid.positions[opening.vertices], lines)[limb]) == 1
+            around = links(laid.positions[opening.vertices], lines)
+            assert abs(around[limb]) == 1
+            assert sum(map(abs, around.values())) == 1
     for name in names:
         assert middle(cloth, laid, name)[2] * (1.0 if name.startswith("front") else -1.0) > 0.02
     sides = {name: np.sign(middle(cloth, laid, name)[0]) for name in names}

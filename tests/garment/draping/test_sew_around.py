@@ -130,8 +130,13 @@ def test_a_shirt_is_sewn_by_its_seams_alone():
     aside[worn.cloth.welded[worn.cloth.piece_vertices["l"]]] += [0.0, 0.0, 0.4]
     with pytest.raises(InputError, match="piece 'l': its opening of 443 mm was sewn beside the left arm"):
         check_sewn(worn.cloth, aside, **check)
-    crumpled = worn.positions * [2.5, 1.0, 2.5]
-    with pytest.raises(InputError, match=r"sewn into a tangle, most at '.': .* is stretched by over 50 %"):
+    wide = worn.positions * [2.5, 1.0, 2.5]
+    with pytest.raises(InputError, match=r"piece '.': .* would be stretched by over 50 %.* too small for this body"):
+        check_sewn(worn.cloth, wide, [], [], lines)
+    # Every other vertex on the other side.
+    crumpled = worn.positions.copy()
+    crumpled[::2, 2] *= -1.0
+    with pytest.raises(InputError, match=r"sewn into a tangle, most at '.': .* of their edges pierce cloth"):
         check_sewn(worn.cloth, crumpled, [], [], lines)
 
 

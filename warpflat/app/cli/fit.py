@@ -118,29 +118,29 @@ def fit(
         study_table,
         write_study,
     )
+    from warpflat.app.scene.options import scene_tables
 
     ease = ease_wishes(eases)
     if len(set(bodies)) < len(bodies):
         raise InputError(f"--to: {next(b for b in bodies if bodies.count(b) > 1)!r} is given twice; give it once")
     name = re.sub(r"[^A-Za-z0-9_.-]+", "_", plain_letters(options["name"] or garment.stem)).strip("_.-") or "garment"
     folder = out if out is not None else Path("out") / f"{name}-fitted"
-    tables: dict[str, Any] = {"relax": {}, "output": {"picture": not options["no_picture"]}}
-    for key in ("fabric", "shear_limit", "bands"):
-        if options[key] is not None:
-            tables[key] = options[key]
-    tables["fabric_files"] = list(options["fabric_files"])
-    if options["frames"] is not None:
-        tables["output"]["frames"] = options["frames"]
-    for option, key in (("seams", "find"), ("front", "front")):
-        if options[option] is not None:
-            tables.setdefault("find_seams", {})[key] = options[option]
-    tables["seams_cut"] = [drawn_seam(text) for text in options["cut_seams"]]
-    for text, cut in zip(options["cut_seams"], tables["seams_cut"], strict=True):
+    cuts = [drawn_seam(text) for text in options["cut_seams"]]
+    for text, cut in zip(options["cut_seams"], cuts, strict=True):
         if not cut.keys() & {"points", "plane"} and not isinstance(cut.get("line"), list):
             raise InputError(
                 f"--cut-seam {quote_value(text)}: what is carried is drawn by points:, line:X,Y,Z ... or plane:"
             )
-    check_tables(tables, garment)
+    options |= {
+        "cut_seam": tuple(cuts),
+        "fabric_file": options["fabric_files"],
+        "units": None,
+        "prim": None,
+        "name": None,
+    }
+    tables = scene_tables(options)
+    tables["output"] = {"picture": not options["no_picture"], **tables.get("output", {})}
+    check_tables(tables, garment, options["cut_seams"])
     require_own_study(folder)
     start_warp_silently()
     job = FitJob.start(

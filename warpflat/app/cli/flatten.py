@@ -128,7 +128,12 @@ _CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|mar
     "straight where a slender ring is sewn along one side, as a neck band.  [default: auto]",
 )
 @click.option("--bands-shorter", type=float, metavar="SHARE", help="Cut straight bands shorter still, as rib is: 0.1.")
-@click.option("--model", metavar="NAME", help="springs, or membrane: the cloth measured as worn.  [default: springs]")
+@click.option(
+    "--model",
+    metavar="NAME",
+    help="auto: springs on quads along the grain, else membrane, cells in which the cloth is measured as worn; membrane: everywhere.  "
+    "[default: auto]",
+)
 @click.option("--stretch-warp", type=float, metavar="SHARE", help="Worn so much longer than flat along the warp: 0.1.")
 @click.option("--stretch-weft", type=float, metavar="SHARE", help="The same along the weft.")
 @click.option("--pressure", type=float, metavar="PA", help="On the skin; sets the stretch that runs around the body.")
@@ -176,44 +181,15 @@ def flatten(
       warpflat flatten tshirt.usd --pattern uv
     """
     from warpflat.app.scene.load import make_scene
+    from warpflat.app.scene.options import COMMAND_LINE, errors_of_options, scene_tables
 
-    tables: dict[str, Any] = {"surface": {"file": str(mesh)}, "relax": {}, "output": {}}
-    places = {
-        "units": ("surface", "units"),
-        "component": ("surface", "component"),
-        "prim": ("surface", "prim"),
-        "pattern": ("surface", "pattern"),
-        "meet": ("surface", "meet_mm"),
-        "solver": ("relax", "solver"),
-        "max_steps": ("relax", "max_steps"),
-        "time_step": ("relax", "time_step"),
-        "gap": ("relax", "gap_mm"),
-        "frames": ("output", "frames"),
-        "stretch_warp": ("wear", "stretch_warp"),
-        "stretch_weft": ("wear", "stretch_weft"),
-        "pressure": ("wear", "pressure"),
-        "seams": ("find_seams", "find"),
-        "front": ("find_seams", "front"),
-        "up": ("find_seams", "up"),
-        "most_pieces": ("find_seams", "most_pieces"),
-        "limit": ("find_seams", "limit"),
-        "smooth": ("find_seams", "smooth_mm"),
-        "body": ("find_seams", "body"),
-    }
-    for option, (table, key) in places.items():
-        if options[option] is not None:
-            tables.setdefault(table, {})[key] = options[option]
-    for option in ("no", "keep"):
-        if options[option]:
-            tables.setdefault("find_seams", {})[option] = list(options[option])
-    tables["seams_cut"] = [drawn_seam(text) for text in options["cut_seams"]]
+    options["cut_seam"] = tuple(drawn_seam(text) for text in options["cut_seams"])
+    options["fabric_file"] = options["fabric_files"]
     if options["component"] is not None and re.fullmatch(r"-?[0-9]{1,18}", options["component"]):
-        tables["surface"]["component"] = int(options["component"])
-    for key in ("name", "fabric", "shear_limit", "start", "model", "bands", "bands_shorter"):
-        if options[key] is not None:
-            tables[key] = options[key]
-    tables["fabric_files"] = list(options["fabric_files"])
-    tables["output"]["picture"] = not options["no_picture"]
+        options["component"] = int(options["component"])
+    tables = scene_tables(options)
+    tables["surface"] = {"file": str(mesh), **tables.get("surface", {})}
+    tables["output"] = {"picture": not options["no_picture"], **tables.get("output", {})}
     pieces: dict[str, dict[str, Any]] = {}
     for option, values in (("--datum", datums), ("--open", openings), ("--grain-angle", grain_angles)):
         for value in values:
@@ -243,24 +219,9 @@ def flatten(
         tables["pieces"] = pieces
     # "Ärmel (1).obj" gives files "Armel_1".
     name = re.sub(r"[^A-Za-z0-9_.-]+", "_", plain_letters(mesh.stem)).strip("_.-") or "piece"
-    try:
-        scene = make_scene(tables, name=name, folder=Path(), where="command line")
+    with errors_of_options(mesh, options["cut_seams"]):
+        scene = make_scene(tables, name=name, folder=Path(), where=COMMAND_LINE)
         return run_and_report(scene, out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)
-    except InputError as error:
-        message = re.sub(r'component = "(largest|all)"', r"--component \1", str(error))
-        message = (
-            message.replace("command line: find_seams.body", "--body")
-            .replace("command line: bands", "--bands")
-            .replace("command line: shear_limit", "--shear-limit")
-            .replace("--bands_shorter", "--bands-shorter")
-        )
-        message = re.sub(
-            r"command line: seams_cut\[(\d+)\]",
-            lambda found: f"--cut-seam {options['cut_seams'][int(found[1])]!r}",
-            message,
-        )
-        # What is said of no option is about the mesh.
-        raise InputError(re.sub(r"^command line: (?![\w.\[\]]+(:| = | '))", lambda _: f"{mesh}: ", message)) from None
 
 
 def drawn_seam(text: str) -> dict[str, Any]:

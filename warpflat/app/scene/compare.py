@@ -7,18 +7,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from warpflat.app.scene.comparison import Comparison
 from warpflat.app.scene.drape import drape_scene
 from warpflat.app.scene.form_shaping import settle_shape
 from warpflat.app.scene.load import Scene, scene_fabric
 from warpflat.app.scene.plan import MeshPlan, plan_scene
-from warpflat.core import FloatArray, InputError
+from warpflat.core import InputError, laid_upon
 from warpflat.flat import STRAINS, Progress, advise, judge
 from warpflat.garment import Garment
 
-__all__ = ["compare_fabrics", "compared_files", "comparison_table", "laid_upon", "save_comparison"]
+__all__ = ["compare_fabrics", "compared_files", "comparison_table", "save_comparison"]
 
 
 def compare_fabrics(
@@ -76,14 +74,6 @@ def compare_fabrics(
     sewing = {name: garment.sewing_metrics() for name, garment in garments.items()}
     drapes = {name: drape_scene(dressed[name], garments[name], device=device) for name in garments if drape}
     return Comparison(name=scene.name, results=results, layouts=layouts, sewing=sewing, drapes=drapes)
-
-
-def laid_upon(target: FloatArray, layout: FloatArray) -> FloatArray:
-    """Turn and shift a layout (#V by 2 [m]) to lie as near as it can to a target layout (Kabsch 1976)."""
-    centre, aim = layout.mean(axis=0), target.mean(axis=0)
-    u, _, v = np.linalg.svd((layout - centre).T @ (target - aim))
-    turn = u @ np.diag([1.0, float(np.sign(np.linalg.det(u @ v)))]) @ v
-    return np.asarray((layout - centre) @ turn + aim)
 
 
 def compared_files(*, drape: bool) -> list[str]:

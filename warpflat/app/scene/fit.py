@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.app.scene.load import Scene, make_scene, scene_fabric
+from warpflat.app.scene.load import make_scene, scene_fabric
+from warpflat.app.scene.options import COMMAND_LINE, errors_of_options
 from warpflat.core import (
     FloatArray,
     InputError,
@@ -331,7 +332,7 @@ class FitJob:
                 for path in plane_sections(surface, point, plane["normal"], towards=plane.get("towards"))
             ]
             if not paths:
-                raise InputError(f"command line: seams_cut[{number}]: the plane misses the garment")
+                raise InputError(f"{COMMAND_LINE}: seams_cut[{number}]: the plane misses the garment")
             longest = max(path.length for _, path in paths)
             for layer, path in paths:
                 if path.length < _WRINKLE * longest:
@@ -388,26 +389,20 @@ def ease_wishes(texts: Sequence[str]) -> dict[str, float]:
     return found
 
 
-def check_tables(tables: Mapping[str, Any], garment: Path) -> None:
+def check_tables(tables: Mapping[str, Any], garment: Path, drawn: Sequence[str] = ()) -> None:
     """Check the tables of a scene that a carried garment will be flattened by, before anything is fitted.
+
+    Args:
+        tables: of the scene.
+        garment: its file.
+        drawn: what `--cut-seam` was given.
 
     Raises:
         InputError: a value or the fabric is wrong.
     """
-    try:
-        scene_fabric(
-            make_scene(
-                {**tables, "surface": {"file": str(garment)}}, name="garment", folder=Path(), where="command line"
-            )
-        )
-    except InputError as error:
-        message = re.sub(
-            r"^command line: find_seams\.(find|front)",
-            lambda found: "--front" if found[1] == "front" else "--seams",
-            str(error),
-        )
-        message = re.sub(r"^command line: seams_cut\[\d+\]", "--cut-seam", message)
-        raise InputError(re.sub(r"^command line: (\w+)", r"--\1", message)) from None
+    with errors_of_options(garment, drawn):
+        given = {**tables, "surface": {"file": str(garment)}}
+        scene_fabric(make_scene(given, name="garment", folder=Path(), where=COMMAND_LINE))
 
 
 def fit_to(
@@ -454,19 +449,19 @@ def fit_to(
         if known:
             own["surface"]["pattern"] = "uv"
             own.pop("find_seams", None)
-        if tables.get("seams_cut"):
-            own["seams_cut"] = job.carry_cuts(carried, tables["seams_cut"])
         try:
-            scene: Scene = make_scene(own, name=name, folder=Path(), where="command line")
-            with output_folder(out, [*files_of_run(scene), *meshes], sources=job.sources, guard=True) as to:
-                result = run_scene(scene, out, device=device, on_progress=on_progress)
-                for file, text in meshes.items():
-                    with atomic_path(to / file) as path:
-                        path.write_text(text, encoding="utf-8")
-                    record_file(to, scene.name, file)
+            with errors_of_options(copy):
+                if tables.get("seams_cut"):
+                    own["seams_cut"] = job.carry_cuts(carried, tables["seams_cut"])
+                scene = make_scene(own, name=name, folder=Path(), where=COMMAND_LINE)
+                with output_folder(out, [*files_of_run(scene), *meshes], sources=job.sources, guard=True) as to:
+                    result = run_scene(scene, out, device=device, on_progress=on_progress)
+                    for file, text in meshes.items():
+                        with atomic_path(to / file) as path:
+                            path.write_text(text, encoding="utf-8")
+                        record_file(to, scene.name, file)
         except InputError as error:
-            words = str(error).replace(str(copy), f"{job.path} on {carried.body}")
-            raise InputError(re.sub(r"^command line: seams_cut\[\d+\]", "--cut-seam", words)) from None
+            raise InputError(str(error).replace(str(copy), f"{job.path} on {carried.body}")) from None
     return replace(result, files=(*result.files, *meshes))
 
 

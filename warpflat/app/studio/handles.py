@@ -12,7 +12,7 @@ import numpy as np
 from warpflat.app.scene.cuts import cut_of_dart, place_of
 from warpflat.app.scene.plan import GarmentPlan
 from warpflat.app.studio.solve import Solution
-from warpflat.core import FloatArray, IntArray, arc_lengths
+from warpflat.core import FloatArray, IntArray, arc_lengths, unit
 from warpflat.flat import Crack, border_loops, seam_kind, triangulate
 from warpflat.garment import FormDart, Neckline, PlacedDart, dart_part, select_bricks
 
@@ -81,10 +81,6 @@ def _slid(
     return Handle(name=name, piece=piece, place=place, change=lambda to: change(float((to - place) @ direction)))
 
 
-def _unit(vector: FloatArray) -> FloatArray:
-    return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-12))
-
-
 def _of_darts(plan: GarmentPlan, name: str, flat: FloatArray) -> Iterator[Handle]:
     """A tip goes along its dart's line; the ends of a mouth make the dart wider or narrower."""
     form = plan.form
@@ -98,7 +94,7 @@ def _of_darts(plan: GarmentPlan, name: str, flat: FloatArray) -> Iterator[Handle
         two_tips = dart_name in form.pieces[name].fisheyes
         # A dart with two tips is widest inside.
         mouth = int(apart.argmax()) if two_tips else 0
-        axis = _unit(flat[left[-1]] - 0.5 * (flat[left[0]] + flat[right[0]]))
+        axis = unit(flat[left[-1]] - 0.5 * (flat[left[0]] + flat[right[0]]))
         # The upper tip may be the first one of the row, or the last.
         ends = form.vertices[dart.row[[0, -1]], 1]
         for end in (0, 1) if two_tips else (1,):
@@ -182,7 +178,7 @@ def _of_sides(solution: Solution, plan: GarmentPlan, name: str, flat: FloatArray
             at = np.flatnonzero(np.isin(piece.grid_vertices[ids], layout.lines.get(level, ())))
             if len(at) == 1 and share is not None:
                 before, after = max(int(at[0]) - 1, 0), min(int(at[0]) + 1, len(ids) - 1)
-                along = _unit(flat[ids[after]] - flat[ids[before]])
+                along = unit(flat[ids[after]] - flat[ids[before]])
                 # Edges run counter-clockwise, so that what is outside lies to their right.
                 yield _slid(
                     f"{edge.rstrip(' 0123456789')} at the {level}", name, flat[ids[at[0]]], np.array([along[1], -along[0]]),
@@ -209,7 +205,7 @@ def _of_neckline(plan: GarmentPlan, name: str, flat: FloatArray) -> Iterator[Han
         key = {"centre front": "front_cm", "centre back": "back_cm", "shoulder": "side_cm"}.get(word)
         row = row if row[0] in neck else row[::-1]
         if key is not None and row[0] in neck and len(row) > 2:
-            along = _unit(flat[row[2]] - flat[row[0]])
+            along = unit(flat[row[2]] - flat[row[0]])
             yield _slid(f"neckline at the {line}", name, flat[row[0]], along, partial(change, key))
 
 
@@ -246,7 +242,7 @@ def _move_end(
         arc = arc_lengths(surface.vertices[np.asarray(surface.lines[table["line"]])])
         share = {vertex: float(s / arc[-1]) for vertex, s in zip(surface.lines[table["line"]], arc, strict=True)}
         tip, other = share[int(seam.path[end])], share[int(seam.path[-1 - end])]
-        axis = _unit(start - 0.5 * (flat[seam.left[-1 - end]] + flat[seam.right[-1 - end]]))
+        axis = unit(start - 0.5 * (flat[seam.left[-1 - end]] + flat[seam.right[-1 - end]]))
         shift = float((to - start) @ axis) / float(arc[-1])
         moved = tip + (shift if tip > other else -shift)
         least = _SHORTEST / float(arc[-1])

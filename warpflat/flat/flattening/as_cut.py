@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.vectors import laid_upon
 from warpflat.flat.fabric.fabric import Fabric
 from warpflat.flat.flattening.datum import resolve_datum
 from warpflat.flat.flattening.develop import Development
@@ -97,13 +98,8 @@ def laid_as_cut(surface: Surface, cut: FloatArray, *, fabric: Fabric, device: st
 def distances_laid(layout: FloatArray, cut: FloatArray) -> FloatArray:
     """Return how far each place lies from its own in the cut panel, #V, when laid on it, turned, moved, and mirrored if that is nearer.
 
-    Source: Kabsch, "A solution for the best rotation to relate two sets of vectors", 1976.
-
     Args:
         layout, cut: #V by 2 [m].
     """
-    a, b = layout - layout.mean(axis=0), cut - cut.mean(axis=0)
-    u, _, v = np.linalg.svd(a.T @ b)
-    sign = np.diag([1.0, np.linalg.det(u @ v)])
-    laid = [a @ u @ mirror @ v for mirror in (sign, sign @ np.diag([1.0, -1.0]))]
-    return min((np.linalg.norm(each - b, axis=1) for each in laid), key=lambda row: float(row.mean()))
+    off = (np.linalg.norm(laid_upon(cut, layout * [mirror, 1.0]) - cut, axis=1) for mirror in (1.0, -1.0))
+    return min(off, key=lambda row: float(row.mean()))

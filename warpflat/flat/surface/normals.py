@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.vectors import unit
 
 __all__ = ["area_vectors", "face_normals", "mean_normals", "vertex_normals"]
 
@@ -21,7 +22,7 @@ def area_vectors(positions: FloatArray, faces: NDArray[np.integer]) -> FloatArra
 
 def face_normals(positions: FloatArray, faces: NDArray[np.integer]) -> FloatArray:
     """Return unit normals of triangles or quads, #F by 3; zero for one without area."""
-    return _unit(area_vectors(positions, faces))
+    return unit(area_vectors(positions, faces))
 
 
 def vertex_normals(positions: FloatArray, faces: NDArray[np.integer]) -> FloatArray:
@@ -32,8 +33,4 @@ def vertex_normals(positions: FloatArray, faces: NDArray[np.integer]) -> FloatAr
 def mean_normals(vectors: FloatArray, faces: NDArray[np.integer], count: int) -> FloatArray:
     """Return the unit normals of `count` vertices, as `vertex_normals` does, by area vectors (#F by 3)."""
     corners, each = faces.T.ravel(), faces.shape[1]
-    return _unit(np.column_stack([np.bincount(corners, np.tile(axis, each), count) for axis in vectors.T]))
-
-
-def _unit(vectors: FloatArray) -> FloatArray:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
+    return unit(np.column_stack([np.bincount(corners, np.tile(axis, each), count) for axis in vectors.T]))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core import FloatArray, IntArray, turning_angles
+from warpflat.core import FloatArray, IntArray, laid_upon, turning_angles
 from warpflat.garment.construction.constraints import Constraint, DrawnLine, FixedLength, KeptGirth, Straight
 from warpflat.pattern import HEMMED_LEVELS, count_inflections, fair_line, fairest_line
 
@@ -199,10 +199,8 @@ def measure_curves(
     for plan, result in zip(plans, results, strict=True):
         place, after = (plan.line.piece, plan.line.line), positions[plan.line.piece][plan.line.vertices]
         # Both shapes are laid upon each other as near as they come.
-        first, second = plan.before - plan.before.mean(axis=0), after - after.mean(axis=0)
-        left, _, right = np.linalg.svd(second.T @ first)
-        laid = second @ (left @ np.diag([1.0, np.sign(np.linalg.det(left @ right))]) @ right)
-        shift = float(shapely.distance(shapely.LineString(laid), shapely.points(first[1:-1])).max())
+        laid = shapely.LineString(laid_upon(plan.before, after))
+        shift = float(shapely.distance(laid, shapely.points(plan.before[1:-1])).max())
         measured.append(
             DrawnCurve(
                 place=".".join(place),

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import BoolArray, FloatArray, arc_lengths, without_side
+from warpflat.core import BoolArray, FloatArray, arc_lengths, unit, without_side
 from warpflat.flat import triangulate, vertex_normals
 from warpflat.pattern import ViewedPiece
 
@@ -170,19 +170,15 @@ def _chains(garment: FormGarment, called: str) -> Iterator[_Chain]:
         points, out, beyond = (
             np.column_stack([np.interp(places, arc, row[:, axis]) for axis in range(3)]) for row in here
         )
-        chain = _Chain(points=points, out=_unit(out), beyond=_unit(beyond), closed=closed)
+        chain = _Chain(points=points, out=unit(out), beyond=unit(beyond), closed=closed)
         # A ring begins in the silhouette, where its near side ends.
         yield chain.begun_at(int(points[:, 0].argmax())) if closed else chain
-
-
-def _unit(vectors: FloatArray) -> FloatArray:
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12))
 
 
 def _sheets(wish: Finishing, chain: _Chain) -> Iterator[_Sheet]:
     """Yield what is drawn of a finishing along one chain."""
     columns = np.arange(len(chain.points), dtype=float)
-    level = _unit(chain.out * [1.0, 0.0, 1.0])
+    level = unit(chain.out * [1.0, 0.0, 1.0])
     if wish.kind in ("waistband", "band", "cuff"):
         width = -wish.width if wish.shaped or wish.shorten else wish.width
         yield _Sheet(rows=np.stack([chain.points, chain.points + width * chain.beyond]), out=chain.out)
@@ -206,7 +202,7 @@ def _falling(wish: Finishing, chain: _Chain, columns: FloatArray, level: FloatAr
     folds = max(2, round(arc[-1] / (wish.pleat or _GATHER_STEP)))
     if wish.kind == "flounce":
         out, folds = min(_MOST_OUT, _FLOUNCE_OUT * wish.turns), max(4, round(_FOLDS_A_TURN * wish.turns))
-    hem = start + wish.width * _unit(chain.beyond + out * level)
+    hem = start + wish.width * unit(chain.beyond + out * level)
     if not wish.pleat:
         hem = hem + _WAVE * np.sin(2.0 * np.pi * folds * arc / arc[-1])[:, None] * chain.beyond
     lines = []
@@ -226,7 +222,7 @@ def _collar(wish: Finishing, chain: _Chain, level: FloatArray) -> Iterator[_Shee
         yield _Sheet(rows=np.stack([chain.points, chain.points + wish.width * _UP]), out=level)
         return
     chain = chain.from_front()
-    level = _unit(chain.out * [1.0, 0.0, 1.0])
+    level = unit(chain.out * [1.0, 0.0, 1.0])
     arc = arc_lengths(chain.points)
     # From nothing in the middle to one at both ends, in the front.
     ends = np.clip(np.abs(2.0 * arc / arc[-1] - 1.0) * 4.0 - 3.0, 0.0, 1.0)[:, None]
@@ -239,10 +235,10 @@ def _collar(wish: Finishing, chain: _Chain, level: FloatArray) -> Iterator[_Shee
         stand, fall = collar.width, collar.fall
         if collar.style == "convertible":
             stand, fall = 0.4 * collar.width, 0.6 * collar.width
-        inwards = np.sign(0.5 * arc[-1] - arc)[:, None] * _unit(np.gradient(chain.points, axis=0))
+        inwards = np.sign(0.5 * arc[-1] - arc)[:, None] * unit(np.gradient(chain.points, axis=0))
         top = chain.points + stand * (1.0 - (collar.style == "convertible") * ends) * _UP
         long = fall * 1.2 + ends * (collar.point - fall * 1.2)
-        rows = [top, top + long * _unit(-_UP + 0.5 * level + 0.7 * ends * inwards)]
+        rows = [top, top + long * unit(-_UP + 0.5 * level + 0.7 * ends * inwards)]
     yield _Sheet(rows=np.stack(rows), out=level)
     if wish.placket:
         top, down = chain.points[0], np.array([0.0, -wish.placket, 0.0])

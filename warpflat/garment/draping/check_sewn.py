@@ -86,6 +86,11 @@ def check_sewn(
         worst = max(
             cloth.piece_vertices, key=lambda name: float(count[cloth.welded[cloth.piece_vertices[name]]].mean())
         )
+        if pierced <= _PIERCED:
+            raise StepError(
+                f"piece {worst!r}: {100 * share:.0f} % of the garment would be stretched by over {100 * _TORN[1]:.0f} %, most of it there: "
+                f"it is too small for this body, or lies wrong: then {_REMEDY}"
+            )
         raise StepError(
             f"the pieces were sewn into a tangle, most at {worst!r}: {100 * pierced:.0f} % of their edges pierce cloth, "
             f"{100 * share:.0f} % of it is stretched by over {100 * _TORN[1]:.0f} %: {_REMEDY}"

@@ -311,6 +311,8 @@ def _rings(
             height, out = min(high - reach, line[0, 1] - _BELOW), -_UP
             centre = np.array([np.interp(-height, -line[:, 1], line[:, c]) for c in range(3)])
             side = 1.0 if name.startswith("left") else -1.0
+            # Two wide legs lie beside each other.
+            centre[0] = side * max(side * centre[0], radius)
             value, looks = -far[named.index("right leg" if side > 0.0 else "left leg")], -side * left
         elif name:
             # A slit is a part of its hem.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from warpflat.core import BoolArray, FloatArray, InputError, arc_lengths
+from warpflat.core import BoolArray, FloatArray, InputError, arc_lengths, unit
 from warpflat.garment.mannequin.body_landmarks import ARM_PLACES, model_places, near_place, value_at
 from warpflat.garment.mannequin.body_model import finer_body
 from warpflat.garment.mannequin.profiles import convex_girth
@@ -37,13 +37,9 @@ def smooth(values: FloatArray, sigma: float) -> FloatArray:
 def tape_around(points: FloatArray, across: FloatArray) -> tuple[float, float]:
     """Return the middle's height and the convex girth [m] of a section's points, #P by 3, in the plane across a direction."""
     first = np.eye(3)[int(np.argmin(np.abs(across)))]
-    first = _unit(first - across * (first @ across))
+    first = unit(first - across * (first @ across))
     axes = np.array([first, np.cross(across, first)])
     return float(0.5 * (points[:, 1].min() + points[:, 1].max())), convex_girth(points @ axes.T)
-
-
-def _unit(vector: FloatArray) -> FloatArray:
-    return np.asarray(vector / np.linalg.norm(vector))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -131,7 +127,7 @@ class ArmSections:
     def frame(self, s: float) -> tuple[FloatArray, FloatArray]:
         """Return the line's point [m] and unit direction at a distance."""
         at, way = (np.array([np.interp(s, self.s, values[:, k]) for k in range(3)]) for values in (self.line, self.way))
-        return at, _unit(way)
+        return at, unit(way)
 
     def tape(self, s: float) -> tuple[float, float]:
         """Return height and girth [m] of a tape across the arm at a distance."""

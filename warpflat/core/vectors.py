@@ -1,0 +1,34 @@
+"""Rows of vectors: unit ones, and points that are laid upon others."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+
+__all__ = ["laid_upon", "unit"]
+
+# A vector shorter than this has no direction, and stays as short.
+_SHORTEST = 1e-300
+
+
+def unit(vectors: FloatArray) -> FloatArray:
+    """Return vectors (... by #D) with length 1; those of no length stay 0."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), _SHORTEST))
+
+
+def laid_upon(target: FloatArray, points: FloatArray, rows: slice | FloatArray = slice(None)) -> FloatArray:
+    """Return points turned and shifted, not mirrored, to lie as near to their targets as they can.
+
+    Source: Kabsch, "A solution for the best rotation to relate two sets of vectors", 1976.
+
+    Args:
+        target: #T by #D [m].
+        points: #P by #D [m].
+        rows: those of the points that have a target, all if not given.
+    """
+    known = points[rows]
+    middle, aim = known.mean(axis=0), target.mean(axis=0)
+    u, _, v = np.linalg.svd((known - middle).T @ (target - aim))
+    u[:, -1] *= np.sign(np.linalg.det(u @ v))
+    return np.asarray((points - middle) @ (u @ v) + aim)
