@@ -7,18 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from bodies import body_of_size
+from flat_forms import flat_form
 
 from warpflat.core.errors import InputError
 from warpflat.garment.construction.button_stand import button_depths
-from warpflat.garment.construction.constraints import Straight
 from warpflat.garment.construction.finishing import Finishing
-from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.linings import add_interfacing
-from warpflat.garment.construction.openings import Buttons, Opening, part_at_centres
+from warpflat.garment.construction.openings import Buttons, Opening
 from warpflat.garment.construction.to_pattern import pattern_of_garment
-from warpflat.garment.mannequin.forms import shipped_form
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.pieces import Pattern
 
@@ -29,17 +26,13 @@ FACING = Finishing(kind="facing", edge="neck", width=0.055)
 @pytest.fixture(scope="module")
 def bodice() -> Garment:
     """A bodice parted at centre front."""
-    mannequin = body_of_size(30.0)
-    form = mannequin.form(part_at_centres(mannequin.layout, shipped_form("bodice"), [BUTTONED]))
-    straight = [Straight(piece=name, line="centre front", along="warp") for name in ("front_left", "front_right")]
-    return flatten_form(mannequin, form, fabric="woven", constraints=straight, curves_mm=0.0)
+    return flat_form("bodice", BUTTONED)
 
 
 @pytest.fixture(scope="module")
 def whole() -> Garment:
     """A bodice in two pieces."""
-    mannequin = body_of_size(30.0)
-    return flatten_form(mannequin, mannequin.form("bodice"), fabric="woven", sewn=True, curves_mm=0.0)
+    return flat_form("bodice")
 
 
 def pattern_of(garment: Garment, *openings: Opening, finishing: tuple[Finishing, ...] = ()) -> Pattern:

@@ -7,18 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from bodies import body_of_size
+from flat_forms import flat_form
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length
 from warpflat.garment.construction.collars import Collar
 from warpflat.garment.construction.finishing import Finishing
-from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.free_edges import free_chain, joined_line
 from warpflat.garment.construction.garment import Garment
-from warpflat.garment.construction.openings import Buttons, Opening, part_at_centres
+from warpflat.garment.construction.openings import Buttons, Opening
 from warpflat.garment.construction.to_pattern import pattern_of_garment
-from warpflat.garment.mannequin.forms import shipped_form
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.fitting import drawn_length
 from warpflat.pattern.drafting.piece_parts import Edge
@@ -34,35 +32,19 @@ def drawn(edge: Edge) -> float:
     return drawn_length(edge.points)
 
 
-def flat(*openings: Opening) -> Garment:
-    mannequin = body_of_size(30.0)
-    form = part_at_centres(mannequin.layout, shipped_form("bodice"), openings)
-    garment = flatten_form(mannequin, mannequin.form(form), fabric="woven", sewn=True, curves_mm=0.0)
-    # Edges of stands are straight, as a scene asks for.
-    return replace(garment, openings=openings)
-
-
 @pytest.fixture(scope="module")
 def plain() -> Garment:
-    return flat()
+    return flat_form("bodice")
 
 
 @pytest.fixture(scope="module")
 def zipped() -> Garment:
-    return flat(ZIP)
+    return flat_form("bodice", ZIP)
 
 
 @pytest.fixture(scope="module")
 def buttoned() -> Garment:
-    from warpflat.garment.construction.constraints import Straight
-
-    mannequin = body_of_size(30.0)
-    form = part_at_centres(mannequin.layout, shipped_form("bodice"), [BUTTONS])
-    straight = [Straight(piece=f"front_{side}", line="centre front", along="warp") for side in ("left", "right")]
-    garment = flatten_form(
-        mannequin, mannequin.form(form), fabric="woven", sewn=True, curves_mm=0.0, constraints=straight
-    )
-    return replace(garment, openings=(BUTTONS,))
+    return flat_form("bodice", BUTTONS)
 
 
 def with_neck(garment: Garment, kind: str = "collar", **collar: object) -> Pattern:

@@ -7,15 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bodies import body_of_size
+from flat_forms import flat_form
 
 from warpflat.core.errors import InputError
 from warpflat.garment.construction.finishing import Finishing
-from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.garment import Garment
-from warpflat.garment.construction.openings import Opening, part_at_centres
+from warpflat.garment.construction.openings import Opening
 from warpflat.garment.construction.to_pattern import pattern_of_garment
-from warpflat.garment.mannequin.forms import shipped_form
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.fitting import drawn_length
 from warpflat.pattern.drafting.pieces import Pattern
@@ -25,24 +23,16 @@ ZIP = Opening(kind="zip", line="centre back", length=0.4)
 FACING = Finishing(kind="facing", edge="neck", width=0.055)
 
 
-def bodice(half: bool) -> Garment:
-    mannequin = body_of_size(30.0)
-    form = shipped_form("bodice")
-    if not half:
-        form = part_at_centres(mannequin.layout, form, [ZIP])
-    return flatten_form(mannequin, mannequin.form(form, half=half), fabric="woven", sewn=True, curves_mm=0.0)
-
-
 @pytest.fixture(scope="module")
 def parted() -> Garment:
     """A bodice whose back is parted for a zip."""
-    return replace(bodice(half=False), openings=(ZIP,))
+    return flat_form("bodice", ZIP)
 
 
 @pytest.fixture(scope="module")
 def half() -> Garment:
     """The left half of a bodice without openings."""
-    return bodice(half=True)
+    return flat_form("bodice", half=True)
 
 
 def finished(garment: Garment, *wishes: Finishing) -> Pattern:

@@ -6,23 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bodies import body_of_size
+from flat_forms import flat_form
 
 from warpflat.garment.construction.finishing import Finishing
-from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.line_drawing import describe_worn
-from warpflat.garment.construction.openings import Buttons, Opening, part_at_centres
-from warpflat.garment.mannequin.forms import shipped_form
+from warpflat.garment.construction.openings import Buttons, Opening
 from warpflat.pattern.drafting.piece_parts import Edge
 from warpflat.pattern.drafting.pieces import Piece
 
 
 def skirt(opening: Opening, *, half: bool) -> Garment:
-    mannequin, form = body_of_size(30.0), shipped_form("skirt")
-    form = form if half else part_at_centres(mannequin.layout, form, [opening])
-    garment = flatten_form(mannequin, mannequin.form(form, half=half), fabric="woven", sewn=True, curves_mm=0.0)
-    return replace(garment, openings=(opening,), finishing=(Finishing(kind="waistband", edge="waist", width=0.03),))
+    garment = flat_form("skirt", opening, half=half)
+    return replace(garment, finishing=(Finishing(kind="waistband", edge="waist", width=0.03),))
 
 
 def test_waistband_lies_above_the_waist_and_a_zip_in_the_side_is_seen_on_that_side():

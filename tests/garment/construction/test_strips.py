@@ -8,17 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bodies import body_of_size
+from flat_forms import flat_form
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.garment.construction.finishing import Finishing
-from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.garment import Garment
-from warpflat.garment.construction.openings import Opening, part_at_centres
+from warpflat.garment.construction.openings import Opening
 from warpflat.garment.construction.strips import Strip, swept
 from warpflat.garment.construction.to_pattern import pattern_of_garment
-from warpflat.garment.mannequin.forms import Form, shipped_form
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.fitting import drawn_length
@@ -29,22 +27,14 @@ from warpflat.pattern.drafting.sewing_order import notions, sewing_steps
 ZIP = Opening(kind="zip", line="centre back", length=0.3)
 
 
-def flat(form: Form, *openings: Opening, half: bool = False) -> Garment:
-    mannequin = body_of_size(30.0)
-    if not half:
-        form = part_at_centres(mannequin.layout, form, openings)
-    garment = flatten_form(mannequin, mannequin.form(form, half=half), fabric="woven", sewn=True, curves_mm=0.0)
-    return replace(garment, openings=openings)
-
-
 @pytest.fixture(scope="module")
 def shirt() -> Garment:
-    return flat(shipped_form("shirt"), ZIP)
+    return flat_form("shirt", ZIP)
 
 
 @pytest.fixture(scope="module")
 def half_skirt() -> Garment:
-    return flat(shipped_form("skirt"), half=True)
+    return flat_form("skirt", half=True)
 
 
 def finished(garment: Garment, *wishes: Finishing) -> Pattern:

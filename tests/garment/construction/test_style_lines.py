@@ -196,6 +196,11 @@ def test_ruffle_takes_the_place_of_what_a_slanted_hem_loses(skirt: Garment):
     assert matches(sewn)
 
 
+def test_a_slanted_hem_keeps_the_mark_of_the_tie_on_the_outline(wrapped: Garment):
+    cut = finish_edges(pattern_of(wrapped), [slanted({"side": 0.1, "centre back": 0.0})])
+    assert "tie" in cut.piece("front_skirt_left", "").marks
+
+
 def test_line_that_meets_no_hem_is_named(skirt: Garment):
     with pytest.raises(InputError, match="no line 'cuff' meets 'knee'"):
         finish_edges(pattern_of(skirt), [slanted({"cuff": 0.1})])

@@ -29,7 +29,7 @@ from warpflat.pattern.export.geometry import face_areas, outline_edges
 from warpflat.pattern.export.letters import all_letters, is_drawn, note_on_names, titles
 from warpflat.pattern.export.packing import pack_boxes, pack_rows
 from warpflat.pattern.export.picture import DraftedOutline, PicturePiece, draw_figure, write_picture
-from warpflat.pattern.export.raster import Lighting, Samples, rasterise, shade
+from warpflat.pattern.export.raster import BACK, LIGHT, Samples, rasterise, shade
 
 
 def find_piece(shape, density=None, **options) -> PicturePiece:
@@ -363,9 +363,8 @@ def test_light_falls_by_the_blended_normal_and_the_reverse_is_greyed() -> None:
     samples = rasterise(points, triangles, (40, 40))
     face = np.arange(len(triangles), dtype=np.int32)
     colours = np.random.default_rng(3).random((len(triangles), 3))
-    light, back = np.array([0.6, 0.0, 0.8]), (0.7, 0.8, 0.9)
-    lighting = Lighting(normals=normals, direction=tuple(2.0 * light), back=back)
-    pixels = shade(samples, 1, points, triangles, colours, face=face, lighting=lighting)
+    light, back = np.array(LIGHT) / np.linalg.norm(LIGHT), BACK
+    pixels = shade(samples, 1, points, triangles, colours, face=face, normals=normals)
     assert (pixels[..., 3] == 255).all()
     for row, column in np.random.default_rng(4).integers(0, 40, (200, 2)):
         triangle = samples.triangle[row, column]
@@ -386,10 +385,11 @@ def test_a_triangle_lit_by_its_own_normal_has_one_colour() -> None:
     samples = rasterise(points, triangles, (40, 40))
     own = np.tile([0.0, 0.0, 3.0], (len(triangles), 1))
     face = np.zeros(len(triangles), dtype=np.int32)
-    lighting = Lighting(normals=own, at_vertices=False)
-    pixels = shade(samples, 2, points, triangles, np.array([[0.2, 0.4, 0.6]]), face=face, lighting=lighting)
+    colour = np.array([[0.2, 0.4, 0.6]])
+    pixels = shade(samples, 2, points, triangles, colour, face=face, normals=own, at_vertices=False)
     assert pixels.shape == (20, 20, 4)
-    np.testing.assert_array_equal(pixels.reshape(-1, 4), np.tile([54, 107, 161, 255], (400, 1)))
+    shade_of = np.round(255.0 * colour[0] * (0.55 + 0.50 * LIGHT[2] / np.linalg.norm(LIGHT)))
+    np.testing.assert_array_equal(pixels.reshape(-1, 4), np.tile([*shade_of, 255], (400, 1)))
 
 
 def test_samples_are_averaged_over_what_is_covered() -> None:
@@ -554,3 +554,12 @@ def test_cloth_without_strain_has_no_scale_of_colours(tmp_path: Path) -> None:
     red = energy_colours(0.6, 1.0)
     assert near(none, red) == 0
     assert near(some, red) > 200
+
+
+def test_a_page_of_hundreds_of_pieces_has_fewer_pixels_per_inch() -> None:
+    pen = Pen(12.0, 4.0)
+    assert pen.dpi == 150.0
+    pen.resize(12.0, 300.0)
+    assert np.prod(pen.figure.get_size_inches() * pen.figure.dpi) == pytest.approx(2.4e7)
+    pen.resize(12.0, 8.0)
+    assert pen.figure.dpi == 150.0

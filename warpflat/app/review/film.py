@@ -26,13 +26,13 @@ from warpflat.core import (
     check_layers,
     read_apart,
     reading,
-    weighted_percentile,
 )
 from warpflat.flat import triangulate
 from warpflat.pattern import (
     DRAFTED,
     DRAFTED_CLOTH,
     SKIN,
+    Scale,
     VertexColours,
     energy_colours,
     face_areas,
@@ -50,8 +50,8 @@ _COLOURS = 256
 #: Maps beside energy and strain, by the name of their primvar: unit on the page, how many of these the file's unit is, and the least
 #: upper end of a scale.
 MAPS: Mapping[str, tuple[str, float, float]] = {"pressure": ("Pa", 1.0, 10.0), "gap": ("mm", 1e3, 5.0)}
-# A scale holds this share of the cloth; no value of a map is larger.
-_SHARE, _MOST_OF_MAP = 0.98, 1e9
+# No value of a map is larger.
+_MOST_OF_MAP = 1e9
 # A body of more vertices than these is not shown.
 _MOST_OF_BODY = 100_000
 # Of zlib: the last level takes eight times as long as this one, and spares a twentieth of the bytes.
@@ -234,8 +234,8 @@ def pack_film(pieces: Sequence[FilmPiece]) -> dict[str, Any] | None:
         areas = np.concatenate(
             [face_areas(shape.surface, shape.faces) for piece in pieces for shape in shapes[piece.name][:1]]
         )
-        high = factor * weighted_percentile(np.maximum(values, 0.0), areas, _SHARE)
-        maps[key] = {"unit": unit, "high": max(high, least), "state": pieces[0].maps[key][1]}
+        high = Scale.from_zero(factor * values, areas, least).high
+        maps[key] = {"unit": unit, "high": high, "state": pieces[0].maps[key][1]}
     packer = zlib.compressobj(_LEVEL)
     parts, entries = list[bytes](), list[dict[str, Any]]()
     for piece in pieces:

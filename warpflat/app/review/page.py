@@ -28,7 +28,7 @@ from warpflat.core import (
     recorded_files,
     report_activity,
 )
-from warpflat.pattern import SMALLEST_SCALE
+from warpflat.pattern import SMALLEST_SCALE, Scale
 
 __all__ = ["pack_frames", "pack_pictures", "read_run", "review_folder", "write_review"]
 
@@ -168,12 +168,10 @@ def _page(
                 f'<button data-view="{view}">{view.capitalize()}</button>'
                 for view in ("all", "front", "side", "back", "pattern")
             )
-            colours = base64.b64decode(packed["colours"])
-            stops = ",".join(
-                f"rgb({colours[i]},{colours[i + 1]},{colours[i + 2]})" for i in range(0, len(colours), 3 * 15)
-            )
             hint = "point at the cloth for its value; click a piece to single it out; drag to turn, shift-drag to move, ctrl-wheel to zoom"
-            scale = f'<span id="low">0</span> <i style="background:linear-gradient(90deg,{stops})"></i> '
+            scale = (
+                f'<span id="low">0</span> <i style="background:linear-gradient(90deg,{Scale(high=1.0).css()})"></i> '
+            )
             scale += f'<span id="high">{packed["scale"]:.3g} J/m²</span>'
             if packed["scale"] <= SMALLEST_SCALE:
                 scale = "No strain energy: the cloth lies flat without strain"

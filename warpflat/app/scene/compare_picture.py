@@ -113,21 +113,10 @@ def write_overlay_picture(path: str | os.PathLike[str], comparison: Comparison) 
             close.set_xticks([])
             close.set_yticks([])
             length = 10.0 ** np.floor(np.log10(1.6 * reach))
-            x, y = at[0] - 1.5 * reach, at[1] - 0.9 * reach
-            close.plot([x, x + length], [y, y], color="black", linewidth=2)
-            close.annotate(
-                f"{1e3 * length:g} mm", (x + length, y), xytext=(4, -3), textcoords="offset points", fontsize=9
-            )
+            _draw_length(close, at[0] - 1.5 * reach, at[1] - 0.9 * reach, length, f"{1e3 * length:g} mm")
             close.set_title(f"{label}: {1e3 * apart:.1f} mm", fontsize=10)
             whole.plot(*at, "o", mfc="none", mec="#555555", ms=11)
-            whole.annotate(
-                str(number + 1),
-                (float(at[0]), float(at[1])),
-                xytext=(9, 6),
-                textcoords="offset points",
-                color="#555555",
-                fontsize=10,
-            )
+            whole.annotate(str(number + 1), at, xytext=(9, 6), textcoords="offset points", color="#555555", fontsize=10)
             close.text(0.03, 0.9, str(number + 1), transform=close.transAxes, color="#555555", fontsize=11)
         whole.set_axis_off()
         most = {fabric: 1e3 * d["outline, most"] for fabric, d in comparison.distances(piece).items()}
@@ -135,10 +124,7 @@ def write_overlay_picture(path: str | os.PathLike[str], comparison: Comparison) 
         whole.set_title(f"{piece}: outline apart by at most {words}", fontsize=11, loc="left")
         low, high = whole.get_xlim()[0], whole.get_ylim()[0]
         length = 0.1 if whole.get_xlim()[1] - low > 0.25 else 0.02
-        whole.plot([low, low + length], [high, high], color="black", linewidth=2)
-        whole.annotate(
-            f"{100 * length:.0f} cm", (low + length / 2, high), xytext=(0, 4), textcoords="offset points", ha="center"
-        )
+        _draw_length(whole, low, high, length, f"{100 * length:.0f} cm")
     handles = []
     for colour, dashes in map(_style, range(len(comparison.fabrics))):
         handles.append(Line2D([], [], color=colour, linestyle=(0, dashes) if dashes else "-", linewidth=1.6))
@@ -152,6 +138,11 @@ def write_overlay_picture(path: str | os.PathLike[str], comparison: Comparison) 
     )
     with atomic_path(path) as temporary:
         figure.savefig(temporary, format="png", bbox_inches="tight", metadata={"Software": "warpflat"})
+
+
+def _draw_length(axis: Axes, x: float, y: float, length: float, words: str) -> None:
+    axis.plot([x, x + length], [y, y], color="black", linewidth=2)
+    axis.annotate(words, (x + length, y), xytext=(4, -3), textcoords="offset points", fontsize=9)
 
 
 def _draw_outlines(axis: Axes, comparison: Comparison, piece: str, *, width: float) -> None:

@@ -8,8 +8,6 @@ from html import escape
 from typing import Any
 from urllib.parse import quote
 
-import numpy as np
-
 from warpflat.app.studio.maps import MAPS, MapScale
 from warpflat.app.studio.save import Saved
 from warpflat.app.studio.session import Preview, Session
@@ -294,12 +292,10 @@ def _legend(scale: MapScale) -> str:
     """Return the scale of a map."""
     if scale.is_blank:
         return "<div style='padding:0.3em 0.9em'>nothing to be seen: the cloth lies without strain</div>"
-    steps = [scale.low + (scale.high - scale.low) * k / 16.0 for k in range(17)]
-    stops = ",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in 255.0 * scale.rgb(np.array(steps)))
     ends = [scale.low, 0.5 * (scale.low + scale.high), scale.high]
     ticks = "".join(f"<span>{value:.3g}</span>" for value in ends)
     return (
         f"<div style='padding:0.1em 0.9em;font-size:0.85em'>{MAPS[scale.kind]}"
-        f"<div style='height:0.9em;border:1px solid #999;background:linear-gradient(90deg,{stops})'></div>"
+        f"<div style='height:0.9em;border:1px solid #999;background:linear-gradient(90deg,{scale.css()})'></div>"
         f"<div style='display:flex;justify-content:space-between'>{ticks}</div></div>"
     )

@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, arc_lengths, find_unused_name, part_between, points_at_lengths
+from warpflat.core import FloatArray, InputError, arc_lengths, find_unused_name, part_between
+from warpflat.garment.construction.edges import (
+    ON_EDGE,
+    backwards,
+    beside,
+    direction,
+    downwards,
+    mirrored,
+    runs_down,
+    trimmed,
+    with_edges,
+)
 from warpflat.garment.construction.facings import STAND, STAND_END
 from warpflat.garment.construction.openings import Buttons, Opening
 from warpflat.pattern import FOLD_STRAIGHT, Edge, Piece
@@ -65,38 +77,21 @@ def with_button_stand(piece: Piece, name: str, opening: Opening, end: float, dep
     Raises:
         InputError: the edge is not straight.
     """
-    edges, upper, lower, down, out = _beside(piece, name, "have a button stand")
-    at = [edge.name for edge in edges].index(name)
-    edge = edges[at]
-    top, low = edge.points[[0, -1] if down else [-1, 0]]
-    along = (low - top) / np.linalg.norm(low - top)
-    whole = end > edge.length - 1e-6
-    reach = _mirrored(upper.points[::-1] if down else upper.points, top, out, opening.width)
-    if whole:
-        foot = _mirrored(lower.points if down else lower.points[::-1], low, out, opening.width)
+    upper, edge, lower, out = _down_its_edge(piece, name, "have a button stand")
+    top, low = edge.points[[0, -1]]
+    along = direction(edge.points)
+    reach = _reflected(upper.points[::-1], top, out, opening.width)
+    new = {upper.name: [replace(upper, points=np.vstack([upper.points, reach[1:]]))]}
+    if end > edge.length - 1e-6:
+        foot = _reflected(lower.points, low, out, opening.width)
+        new[lower.name] = [replace(lower, points=np.vstack([foot[::-1], lower.points[1:]]))]
+        below = []
     else:
-        corner = top + end * along
-        foot = np.array([corner, corner + opening.width * out])
-    stand = Edge(name=f"{name} {STAND}", points=_turned([reach[-1], foot[-1]], down))
-    ends = {
-        upper.name: replace(
-            upper,
-            vertices=None,
-            points=np.vstack([upper.points, reach[1:]] if down else [reach[::-1], upper.points[1:]]),
-        )
-    }
-    new = [stand]
-    if whole:
-        ends[lower.name] = replace(
-            lower, vertices=None, points=np.vstack([foot[::-1], lower.points[1:]] if down else [lower.points, foot[1:]])
-        )
-    else:
-        rest = edge.points[np.argsort((edge.points - top) @ along)]
-        rest = np.vstack([foot[0], rest[(rest - top) @ along > end + 1e-6]])
-        step = Edge(name=f"{name} {STAND_END}", points=_turned(foot[::-1], down))
-        new = [stand, step, replace(edge, points=_turned(rest, down), vertices=None)]
-    edges[at : at + 1] = new if down else new[::-1]
-    edges = [ends.get(each.name, each) for each in edges]
+        foot = top + end * along + np.outer([0.0, opening.width], out)
+        rest = edge.points[(edge.points - top) @ along > end + 1e-6]
+        step = Edge(name=f"{name} {STAND_END}", points=foot[::-1])
+        below = [step, replace(edge, points=np.vstack([foot[0], rest]))]
+    new[name] = [Edge(name=f"{name} {STAND}", points=np.array([reach[-1], foot[-1]])), *below]
     lines = dict(piece.internal_lines)
     lines = {find_unused_name(name, lines): np.array([top, (top + min(end, edge.length) * along)]), **lines}
     # A mark for each button, and a line for each buttonhole across the stand.
@@ -109,7 +104,7 @@ def with_button_stand(piece: Piece, name: str, opening: Opening, end: float, dep
         lines[find_unused_name("buttonhole", lines)] = ends
         for end in ends:
             lines[find_unused_name("buttonhole end", lines)] = end + np.outer([-_BAR, _BAR], along)
-    return replace(piece, edges=edges, internal_lines=lines, marks=marks)
+    return replace(_with_sides(piece, name, new), internal_lines=lines, marks=marks)
 
 
 def with_wrap(piece: Piece, name: str, opening: Opening) -> Piece:
@@ -129,68 +124,64 @@ def with_wrap(piece: Piece, name: str, opening: Opening) -> Piece:
     """
     import shapely
 
-    edges, upper, lower, down, out = _beside(piece, name, "be wrapped")
-    centre = _turned(piece.edge(name).points, down)
+    upper, edge, lower, out = _down_its_edge(piece, name, "be wrapped")
+    centre = edge.points
 
-    def mirrored(edge: Edge, corner: FloatArray) -> FloatArray:
-        line = edge.points if np.array_equal(edge.points[0], corner) else edge.points[::-1]
+    def reflected(edge: Edge, line: FloatArray) -> FloatArray:
         if edge.length < opening.width + _LEAST_LEFT:
             raise InputError(
                 f"{piece.name}.{edge.name} is {1e3 * edge.length:.0f} mm long up to its next corner or dart, too short for a wrap of "
                 f"{1e3 * opening.width:.0f} mm"
             )
-        part = part_between(line, 0.0, opening.width)
-        return np.asarray(part + 2.0 * np.outer((corner - part) @ out, out))
+        return mirrored(part_between(line, 0.0, opening.width), line[0], out)
 
-    foot = mirrored(lower, centre[-1])
+    foot = reflected(lower, lower.points)
     if upper.name == "neck":
-        waists = [line for key, line in piece.internal_lines.items() if key.startswith("waist")]
-        crossed = [
-            end
-            for line in waists
-            for end in line[[0, -1]]
-            if shapely.LineString(centre).distance(shapely.Point(end)) < 1e-3
-        ]
-        corner = crossed[0] + opening.width * out if crossed else foot[-1]
-        head = np.array([_turned(upper.points, down)[0], corner])
+        corner, line = foot[-1], shapely.LineString(centre)
+        waists = [each[[0, -1]] for key, each in piece.internal_lines.items() if key.startswith("waist")]
+        crossed = [end for ends in waists for end in ends if line.distance(shapely.Point(end)) < ON_EDGE]
+        head = np.array([upper.points[0], crossed[0] + opening.width * out if crossed else corner])
     else:
-        head = np.vstack([_turned(upper.points, down), mirrored(upper, centre[0])[1:]])
-    new = {upper.name: replace(upper, points=_turned(head, down), vertices=None)}
+        head = np.vstack([upper.points, reflected(upper, upper.points[::-1])[1:]])
+    new = {
+        upper.name: [replace(upper, points=head)],
+        name: [],
+        lower.name: [replace(lower, points=np.vstack([foot[::-1], lower.points[1:]]))],
+    }
     if np.linalg.norm(foot[-1] - head[-1]) > _LEAST_LEFT:
-        new[name] = Edge(name="wrap edge", points=_turned([head[-1], foot[-1]], down), kind="hem", allowance=_WRAP_HEM)
-    tail = np.vstack([foot[::-1], _turned(lower.points, down)[1:]])
-    new[lower.name] = replace(lower, points=_turned(tail, down), vertices=None)
-    lines = dict(piece.internal_lines)
-    lines[find_unused_name(name, lines)] = centre
-    marks = (
-        {**piece.marks, "tie": head[-1]}
-        if opening.tie and (upper.name != "neck" or len(new) == 3)
-        else dict(piece.marks)
-    )
-    kept = [new.get(edge.name, edge) for edge in edges if edge.name != name or name in new]
-    return replace(piece, edges=kept, internal_lines=lines, marks=marks)
+        points = np.array([head[-1], foot[-1]])
+        new[name] = [Edge(name="wrap edge", points=points, kind="hem", allowance=_WRAP_HEM)]
+    lines = {**piece.internal_lines, find_unused_name(name, piece.internal_lines): centre}
+    tie = {"tie": head[-1]} if opening.tie and (upper.name != "neck" or new[name]) else {}
+    wrapped = _with_sides(replace(piece, internal_lines=lines, marks={**piece.marks, **tie}), name, new)
+    return trimmed(wrapped, wrapped.edges)
 
 
-def _beside(piece: Piece, name: str, what: str) -> tuple[list[Edge], Edge, Edge, bool, FloatArray]:
-    """Return the edges of a half, those above and below its straight edge, whether that runs down, and the direction beyond it.
+def _down_its_edge(piece: Piece, name: str, what: str) -> tuple[Edge, Edge, Edge, FloatArray]:
+    """Return the edge above the straight one of a half, that itself, and the one below, walking down, and the direction beyond it.
 
     Raises:
         InputError: the edge is not straight, so that the piece cannot do `what`.
     """
-    edges = list(piece.edges)
-    at = [edge.name for edge in edges].index(name)
-    points, before, after = edges[at].points, edges[at - 1], edges[(at + 1) % len(edges)]
-    grain = np.array([0.0, 1.0]) if piece.grain is None else piece.grain[1] - piece.grain[0]
-    down = bool((points[-1] - points[0]) @ grain < 0.0)
-    along = (points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0])
-    out = np.array([along[1], -along[0]])
-    stray = float(np.abs((points - points[0]) @ out).max())
+    before, after = beside(piece, name)
+    edge = piece.edge(name)
+    x, y = direction(edge.points)
+    out = np.array([y, -x])
+    stray = float(np.abs((edge.points - edge.points[0]) @ out).max())
     if stray > FOLD_STRAIGHT:
         raise InputError(
             f"{piece.name}.{name} strays {1e3 * stray:.1f} mm from straight and cannot {what}; constrain it, "
             f'[[constraints]] line = "{name}", straight = "warp"'
         )
-    return edges, *((before, after) if down else (after, before)), down, out
+    row = [replace(each, vertices=None) for each in (piece.edge(before), edge, piece.edge(after))]
+    upper, edge, lower = row if runs_down(piece, edge.points) else backwards(row)
+    return upper, edge, lower, out
+
+
+def _with_sides(piece: Piece, name: str, new: Mapping[str, Sequence[Edge]]) -> Piece:
+    """Return a piece with edges in place of others that are given as one walks down the edge of a name."""
+    down = downwards(piece, name)[1]
+    return with_edges(piece, {key: row if down else backwards(row) for key, row in new.items()})
 
 
 def buttonhole(centre: FloatArray, along: FloatArray, diameter: float = 0.012) -> dict[str, FloatArray]:
@@ -207,34 +198,24 @@ def buttonhole(centre: FloatArray, along: FloatArray, diameter: float = 0.012) -
     return {"buttonhole": ends, **bars}
 
 
-def _turned(points: FloatArray | list[FloatArray], down: bool) -> FloatArray:
-    """Return points that run downwards in the direction of the outline."""
-    points = np.asarray(points)
-    return points if down else points[::-1]
-
-
-def _mirrored(points: FloatArray, corner: FloatArray, out: FloatArray, width: float) -> FloatArray:
+def _reflected(points: FloatArray, corner: FloatArray, out: FloatArray, width: float) -> FloatArray:
     """Return the mirror image of a line that begins in a corner, up to a distance beyond it (#P by 2 [m])."""
     away = np.maximum.accumulate(np.maximum(0.0, (corner - points) @ out))
     if away[-1] < width:
         raise InputError(f"an edge beside the button stand is narrower than its {1e3 * width:.0f} mm")
-    image = points + 2.0 * np.outer((corner - points) @ out, out)
-    length = float(np.interp(width, away, arc_lengths(points)))
-    end = points_at_lengths(image, np.array([length]))
-    kept = image[arc_lengths(points) < length - 1e-6]
+    image = part_between(mirrored(points, corner, out), 0.0, float(np.interp(width, away, arc_lengths(points))))
     # The stand is as wide everywhere.
-    end += (width - (end - corner) @ out)[:, None] * out
-    return np.vstack([corner, kept[1:], end])
+    image[-1] += (width - (image[-1] - corner) @ out) * out
+    return image
 
 
-def bust_depth(piece: Piece, name: str, top_first: bool) -> float | None:
+def bust_depth(piece: Piece, name: str) -> float | None:
     """Return how far from the upper end of an edge its piece's bust line meets it [m]; None where it does not."""
     import shapely
 
-    points = piece.edge(name).points
-    edge = shapely.LineString(points if top_first else points[::-1])
+    edge = shapely.LineString(downwards(piece, name)[0])
     for line in (line for key, line in piece.internal_lines.items() if key.startswith("bust")):
         for end in line[[0, -1]]:
-            if edge.distance(shapely.Point(end)) < 1e-3:
+            if edge.distance(shapely.Point(end)) < ON_EDGE:
                 return float(edge.project(shapely.Point(end)))
     return None

@@ -6,16 +6,40 @@ cloth is folded.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, arc_lengths, find_unused_name, points_at_lengths, without_side
-from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
+from warpflat.core import (
+    FloatArray,
+    InputError,
+    arc_lengths,
+    find_unused_name,
+    part_between,
+    polyline_length,
+    without_side,
+)
+from warpflat.garment.construction.edges import (
+    Place,
+    beside,
+    direction,
+    free_piece_name,
+    in_sizes,
+    mirrored,
+    sewn,
+    up_and_across,
+    with_edges,
+    with_pieces,
+)
+from warpflat.pattern import Edge, Pattern, Piece, SeamSide
 
-__all__ = ["INNER", "STAND", "STAND_END", "Stand", "centre_notch", "is_beside", "with_facings", "with_stand_facings"]
+__all__ = [
+    "INNER", "STAND", "STAND_END", "Stand", "centre_notch", "is_beside", "sewn_alike", "strip_along", "strip_piece", "with_facings",
+    "with_stand_facings",
+]  # fmt: skip
 
 #: What the outer edge and the lower end of a button stand are called, after its line, and the inner edge of a facing.
 STAND, STAND_END, INNER = "button stand", "stand end", "inner edge"
@@ -39,13 +63,9 @@ class Stand:
     width: float
 
 
-#: By piece and edge, the piece and edge that the facing has for it, and whether that runs the other way.
-_Parts = dict[tuple[str, str], tuple[str, str, bool]]
-
-
 def with_facings(
     pattern: Pattern,
-    places: Sequence[tuple[str, str]],
+    places: Sequence[Place],
     width: float,
     *,
     gaps: Collection[str] = (),
@@ -65,75 +85,91 @@ def with_facings(
     Raises:
         InputError: a dart ends in an edge, or the facing would not lie within the piece.
     """
-    parts: _Parts = {}
-    pieces = {size: list(row) for size, row in pattern.pieces.items()}
-    seams, called = list(pattern.seams), {seam.name for seam in pattern.seams}
-    taken = {piece.name for piece in pattern.pieces[pattern.sample]}
+    parts, shell = dict[Place, SeamSide](), pattern
     for name, edge in places:
-        title = find_unused_name(f"{name}_{edge}_facing".replace(" ", "_"), taken)
-        taken.add(title)
-        stand = next((each for each in stands if is_beside(pattern, each, (name, edge))), None)
+        title = free_piece_name(pattern, f"{name}_{edge}_facing".replace(" ", "_"))
+        stand = next((each for each in stands if is_beside(shell, each, (name, edge))), None)
+        sample = shell.piece(name, shell.sample)
+        chain = [edge] if stand is None else [edge, stand.edge]
+        chain = chain[::-1] if stand is not None and beside(sample, edge)[0] == stand.edge else chain
         grown_on = stand is not None and stand.grown_on
-        sample = pattern.piece(name, pattern.sample)
-        for row in pieces.values():
-            at = next(k for k, piece in enumerate(row) if piece.name == name)
-            strip = facing_edges(
-                row[at], _chain(row[at], edge, stand), width, around=row[at].internal_lines.get("keyhole")
-            )
-            if stand is not None and grown_on:
-                row[at] = _folded_over(row[at], stand.edge, strip)
-            else:
-                row.append(_facing_piece(row[at], strip, title))
-        words = find_unused_name(title.replace("_", " "), called)
-        called.add(words)
-        for each in (edge, *_ends(sample, _chain(sample, edge, stand))):
-            parts[name, each] = (name, f"facing {each}", True) if grown_on else (title, each, False)
+        pattern = _faced(pattern, name, chain, width, title, stand)
+        for each in (edge, *beside(sample, *chain)):
+            on_facing = SeamSide(piece=title, edge=each)
+            parts[name, each] = SeamSide(piece=name, edge=f"facing {each}", reversed=True) if grown_on else on_facing
         side = SeamSide(piece=name, edge=edge)
-        seams.append(Seam(name=words, sides=((side,), (_part(side, parts),)), notches=centre_notch(sample)))
+        pattern = sewn(pattern, title.replace("_", " "), side, parts[name, edge], notches=centre_notch(sample))
         if stand is not None and not grown_on:
-            side = SeamSide(piece=name, edge=stand.edge)
-            words = find_unused_name(f"{name} {stand.edge} facing".replace("_", " "), called)
-            seams.append(Seam(name=words, sides=((side,), (replace(side, piece=title),))))
-            called.add(words)
-    # Facings are sewn to each other where their pieces are.
-    for seam in pattern.seams:
+            side = replace(side, edge=stand.edge)
+            words = f"{name} {stand.edge} facing".replace("_", " ")
+            pattern = sewn(pattern, words, side, replace(side, piece=title))
+    return sewn_alike(pattern, shell, parts, gaps, f"{places[0][1]} facing")
+
+
+def sewn_alike(
+    pattern: Pattern, shell: Pattern, parts: Mapping[Place, SeamSide], gaps: Collection[str], of: str
+) -> Pattern:
+    """Return a pattern whose strips are sewn to each other where their pieces are.
+
+    Args:
+        pattern: with the strips.
+        shell: the pattern without them.
+        parts: by edge of the shell what lies along it, reversed if that runs the other way.
+        gaps: names of seams that an opening leaves open there.
+        of: what the strips are called.
+    """
+    for seam in shell.seams:
         both = [row[0] for row in seam.sides]
         # Of halves on the fold one seam is listed for both sides, and just one of them has the opening.
-        centre = both[0].piece == both[1].piece
-        if seam.name in gaps and (
-            centre or not any(pattern.piece(side.piece, pattern.sample).on_fold for side in both)
-        ):
-            continue
-        if all(len(row) == 1 for row in seam.sides) and all((side.piece, side.edge) in parts for side in both):
-            first, second = (_part(side, parts) for side in both)
-            words = find_unused_name(f"{seam.name} of {places[0][1]} facing", called)
-            seams.append(Seam(name=words, sides=((first,), (second,))))
-            called.add(words)
-    return replace(pattern, pieces=pieces, seams=seams)
+        centre, on_fold = (
+            both[0].piece == both[1].piece,
+            any(shell.piece(side.piece, shell.sample).on_fold for side in both),
+        )
+        is_open = seam.name in gaps and (centre or not on_fold)
+        if not is_open and all(len(row) == 1 and (row[0].piece, row[0].edge) in parts for row in seam.sides):
+            along = [(side, parts[side.piece, side.edge]) for side in both]
+            sides = [
+                replace(side, piece=part.piece, edge=part.edge, reversed=side.reversed != part.reversed)
+                for side, part in along
+            ]
+            pattern = sewn(pattern, f"{seam.name} of {of}", sides[0], sides[1])
+    return pattern
 
 
 def with_stand_facings(pattern: Pattern, stands: Sequence[Stand]) -> Pattern:
     """Return a pattern with a straight facing along each button stand, which ends raw at its upper and lower end."""
-    pieces = {size: list(row) for size, row in pattern.pieces.items()}
-    seams, called = list(pattern.seams), {seam.name for seam in pattern.seams}
     for stand in stands:
         # "front_left_centre" and "centre front button stand" make "front_left_centre_facing".
         known = stand.piece.split("_")
         known += [word for word in stand.edge.removesuffix(f" {STAND}").split(" ") if word not in known]
         title = "_".join([*known, "facing"])
-        for row in pieces.values():
-            at = next(k for k, piece in enumerate(row) if piece.name == stand.piece)
-            strip = facing_edges(row[at], (stand.edge,), stand.width)
-            if stand.grown_on:
-                row[at] = _folded_over(row[at], stand.edge, strip, sewn=False)
-            else:
-                row.append(_facing_piece(row[at], strip, title))
+        pattern = _faced(pattern, stand.piece, [stand.edge], stand.width, title, stand, sewn_in=False)
         if not stand.grown_on:
             side = SeamSide(piece=stand.piece, edge=stand.edge)
-            words = find_unused_name(title.replace("_", " "), called)
-            called.add(words)
-            seams.append(Seam(name=words, sides=((side,), (replace(side, piece=title),))))
-    return replace(pattern, pieces=pieces, seams=seams)
+            pattern = sewn(pattern, title.replace("_", " "), side, replace(side, piece=title))
+    return pattern
+
+
+def _faced(
+    pattern: Pattern,
+    name: str,
+    chain: Sequence[str],
+    width: float,
+    title: str,
+    stand: Stand | None,
+    *,
+    sewn_in: bool = True,
+) -> Pattern:
+    """Return a pattern with the facing of a piece along some of its edges: folded along its button stand, or a piece of its own."""
+    made = []
+    for piece in in_sizes(pattern, name):
+        around = piece.internal_lines.get("keyhole") if sewn_in else None
+        strip = strip_along(piece, chain, width, around=around)
+        if stand is not None and stand.grown_on:
+            made.append(_folded_over(piece, stand.edge, strip, sewn_in=sewn_in))
+        else:
+            made.append(strip_piece(piece, strip, title, "facing"))
+    return with_pieces(pattern, made)
 
 
 def centre_notch(piece: Piece) -> tuple[float, ...] | None:
@@ -145,32 +181,13 @@ def centre_notch(piece: Piece) -> tuple[float, ...] | None:
     return (0.5,) if whole else None
 
 
-def is_beside(pattern: Pattern, stand: Stand, place: tuple[str, str]) -> bool:
+def is_beside(pattern: Pattern, stand: Stand, place: Place) -> bool:
     """Return whether a button stand lies beside an edge of its piece, at one of its ends."""
-    return stand.piece == place[0] and stand.edge in _ends(pattern.piece(stand.piece, pattern.sample), (place[1],))
+    return stand.piece == place[0] and stand.edge in beside(pattern.piece(stand.piece, pattern.sample), place[1])
 
 
-def _chain(piece: Piece, edge: str, stand: Stand | None) -> tuple[str, ...]:
-    """Return an edge and the stand beside it in the order of the outline."""
-    if stand is None:
-        return (edge,)
-    return (stand.edge, edge) if _ends(piece, (edge,))[0] == stand.edge else (edge, stand.edge)
-
-
-def _ends(piece: Piece, chain: Sequence[str]) -> tuple[str, str]:
-    """Return the names of the edges before and after some that follow each other."""
-    names = [edge.name for edge in piece.edges]
-    return names[names.index(chain[0]) - 1], names[(names.index(chain[-1]) + 1) % len(names)]
-
-
-def _part(side: SeamSide, parts: _Parts) -> SeamSide:
-    """Return the side of a seam on the facing for one on its piece."""
-    piece, edge, flipped = parts[side.piece, side.edge]
-    return replace(side, piece=piece, edge=edge, reversed=side.reversed != flipped)
-
-
-def facing_edges(piece: Piece, chain: Sequence[str], width: float, *, around: FloatArray | None = None) -> list[Edge]:
-    """Return the outline of a facing: its edges, as much of both neighbours as it is wide, and the line at that distance.
+def strip_along(piece: Piece, chain: Sequence[str], width: float, *, around: FloatArray | None = None) -> list[Edge]:
+    """Return the outline of a strip along some edges, as of a facing: with as much of both neighbours as it is wide.
 
     Args:
         piece: that is faced.
@@ -187,18 +204,18 @@ def facing_edges(piece: Piece, chain: Sequence[str], width: float, *, around: Fl
     import shapely
 
     where = f"{piece.name}.{chain[0]}"
-    edges, (before, after) = [piece.edge(name) for name in chain], (piece.edge(name) for name in _ends(piece, chain))
+    edges, (before, after) = [piece.edge(name) for name in chain], (piece.edge(name) for name in beside(piece, *chain))
     if "dart" in (before.kind, after.kind):
         raise InputError(f"a dart ends in {where}: give it a band or a binding instead of a facing")
     # Where a stand ends above the hem, its facing ends straight across.
-    beside = [
-        _prolonged(each, width, forward=each is after) if each.name.endswith(STAND_END) else each
-        for each in (before, after)
-    ]
-    if min(each.length for each in beside) <= width:
-        raise InputError(f"the edges beside {where} are shorter than the facing is wide")
-    last = _start(beside[1].points, width, edges[-1])
-    first = _start(beside[0].points[::-1], width, edges[0])[::-1]
+    ends = []
+    for line, name, edge in ((before.points[::-1], before.name, edges[0]), (after.points, after.name, edges[-1])):
+        if name.endswith(STAND_END):
+            line = np.array([line[0], line[0] + (width + 1e-3) * direction(line)])
+        if polyline_length(line) <= width:
+            raise InputError(f"the edges beside {where} are shorter than the facing is wide")
+        ends.append(_start(line, width, edge))
+    first, last = ends[0][::-1], ends[1]
     line = np.concatenate([edge.points[int(k > 0) :] for k, edge in enumerate(edges)])
     rounding = _ROUND if len(edges) > 1 else 0.0
     offset = shapely.LineString(line).offset_curve(width + rounding)
@@ -226,61 +243,54 @@ def facing_edges(piece: Piece, chain: Sequence[str], width: float, *, around: Fl
     ]
 
 
-def _prolonged(edge: Edge, width: float, *, forward: bool) -> Edge:
-    """Return the lower end of a button stand, longer at its inner end than a facing is wide [m]."""
-    outer, inner = (edge.points[0], edge.points[-1]) if forward else (edge.points[-1], edge.points[0])
-    far = outer + (inner - outer) / np.linalg.norm(inner - outer) * (width + 1e-3)
-    return replace(edge, points=np.array([outer, far] if forward else [far, outer]))
-
-
 def _start(points: FloatArray, length: float, beside: Edge) -> FloatArray:
     """Return the first part of a line: of a given length [m], or up to that distance from a button stand."""
-    at = arc_lengths(points)
     if beside.name.endswith(STAND):
-        start, end = beside.points[0], beside.points[-1]
-        along = (end - start) / np.linalg.norm(end - start)
-        away = np.maximum.accumulate(np.abs((points - start) @ [-along[1], along[0]]))
+        x, y = direction(beside.points)
+        away = np.maximum.accumulate(np.abs((points - beside.points[0]) @ [-y, x]))
         if away[-1] <= length:
             raise InputError(f"the edges beside {beside.name} are shorter than the facing is wide")
-        length = float(np.interp(length, away, at))
-    return np.vstack([points[at < length - 1e-6], points_at_lengths(points, np.array([length]))])
+        length = float(np.interp(length, away, arc_lengths(points)))
+    return part_between(points, 0.0, length)
 
 
-def _facing_piece(piece: Piece, edges: Sequence[Edge], title: str) -> Piece:
-    """Return a facing as a piece of its own."""
+def strip_piece(piece: Piece, edges: Sequence[Edge], title: str, role: str, **other: Any) -> Piece:
+    """Return a strip along edges of a piece as a piece of its own.
+
+    Args:
+        piece: along whose edges it lies.
+        edges: as :func:`strip_along` returns them.
+        title, role: of the new piece.
+        other: more of its attributes, in place of those of the piece.
+    """
     try:
-        # A grain line of the piece's direction in the middle of a facing's outline.
-        grain = np.array([[0.0, 0.0], [0.0, 1.0]]) if piece.grain is None else piece.grain
-        along = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
         inner = next(edge for edge in edges if edge.name == INNER)
         middle = np.concatenate([edges[0].points, inner.points]).mean(axis=0)
-        return Piece(
-            name=title, size=piece.size, fabric=piece.fabric, quantity=piece.quantity, edges=edges, paired=piece.paired,
-            grain=middle + np.outer([-0.02, 0.02], along),
-            role="facing", internal_lines={key: line for key, line in piece.internal_lines.items() if key.startswith("keyhole")},
-        )  # fmt: skip
+        same = {
+            "quantity": piece.quantity, "paired": piece.paired,
+            "grain": middle + np.outer([-0.02, 0.02], up_and_across(piece)[0]),
+            "internal_lines": {key: line for key, line in piece.internal_lines.items() if key.startswith("keyhole")},
+        }  # fmt: skip
+        return Piece(name=title, size=piece.size, fabric=piece.fabric, edges=edges, role=role, **{**same, **other})
     except InputError:
-        raise InputError(f"no facing can be drawn along {piece.name}.{edges[0].name}: make it narrower") from None
+        raise InputError(f"no {role} can be drawn along {piece.name}.{edges[0].name}: make it narrower") from None
 
 
-def _folded_over(piece: Piece, fold: str, edges: Sequence[Edge], *, sewn: bool = True) -> Piece:
+def _folded_over(piece: Piece, fold: str, edges: Sequence[Edge], *, sewn_in: bool) -> Piece:
     """Return a piece with its facing grown on: the mirror image beyond an edge, which becomes a fold line inside."""
     at = [edge.name for edge in edges].index(fold)
     line = edges[at].points[[0, -1]]
-    along = (line[1] - line[0]) / np.linalg.norm(line[1] - line[0])
-    turn = 2.0 * np.outer(along, along) - np.eye(2)
-    mirrored = []
-    for edge in [*edges[:at][::-1], *edges[at + 1 :][::-1]]:
-        name = f"facing {edge.name}"
-        kind = edge.kind if sewn or edge.kind != "seam" else "cut"
-        points = (edge.points[::-1] - line[0]) @ turn.T + line[0]
-        mirrored.append(replace(edge, name=name, kind=kind, points=points, allowance=edge.width, vertices=None))
+    x, y = direction(line)
+    images = [
+        replace(
+            edge, name=f"facing {edge.name}", kind=edge.kind if sewn_in or edge.kind != "seam" else "cut",
+            points=mirrored(edge.points[::-1], line[0], np.array([-y, x])), allowance=edge.width, vertices=None,
+        )
+        for edge in [*edges[:at][::-1], *edges[at + 1 :][::-1]]
+    ]  # fmt: skip
     # Corners are shared bit for bit.
-    mirrored[0].points[0], mirrored[-1].points[-1] = line[0], line[1]
-    for one, other in pairwise(mirrored):
+    images[0].points[0], images[-1].points[-1] = line[0], line[1]
+    for one, other in pairwise(images):
         other.points[0] = one.points[-1]
-    outline: list[Edge] = []
-    for edge in piece.edges:
-        outline += mirrored if edge.name == fold else [edge]
     name = find_unused_name("fold line", piece.internal_lines)
-    return replace(piece, edges=outline, internal_lines={**piece.internal_lines, name: line})
+    return with_edges(piece, {fold: images}, internal_lines={**piece.internal_lines, name: line})

@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, find_unused_name, nearest, other_side, without_side
+from warpflat.core import FloatArray, InputError, nearest, other_side, without_side
 from warpflat.garment.construction.button_stand import buttonhole
 from warpflat.garment.construction.collars import Collar, with_collar, with_hood
+from warpflat.garment.construction.edges import (
+    Place,
+    free_piece_name,
+    in_sizes,
+    sewn,
+    sewn_places,
+    with_edges,
+    with_pieces,
+)
 from warpflat.garment.construction.facings import Stand, centre_notch, is_beside, with_facings, with_stand_facings
 from warpflat.garment.construction.flounces import with_flounce
-from warpflat.garment.construction.free_edges import Break, FreeChain, chain_length, free_chains
+from warpflat.garment.construction.free_edges import Break, FreeChain, chain_allowance, chain_length, free_chains
 from warpflat.garment.construction.plackets import with_placket, with_slits
 from warpflat.garment.construction.shaped_band import shortened, slant_rises, with_shaped_waistband
-from warpflat.garment.construction.strips import CLOTH_WIDTH, Strip, panel_count, strip_edges, swept
-from warpflat.pattern import Elastic, Pattern, Piece, Seam, SeamSide
+from warpflat.garment.construction.strips import CLOTH_WIDTH, NARROW, Strip, panel_count, strip_edges, swept
+from warpflat.pattern import Edge, Elastic, Pattern, Piece, SeamSide
 
 __all__ = ["FINISHES", "Finishing", "finish_edges", "hem_rises", "with_plackets"]
 
@@ -44,8 +54,6 @@ _STRIPS = {
     # A turtleneck, which is doubled and turned down.
     "collar": (True, (0.0, 1.0), "strip"),
 }
-# Allowance of the hem of a ruffle, and of the edge of a casing that is turned in [m].
-_NARROW = 0.010
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,67 +129,81 @@ def finish_edges(
     # the edges beside a stand.
     faced = set[Stand]()
     for number, wish in enumerate(finishing):
-        try:
-            pattern, places = _opened_up(pattern, wish.edge, sewn=wish.kind != "hem")
+        with _said_of(number):
+            pattern, places = _opened_up(pattern, wish.edge, sewn_there=wish.kind != "hem")
             if wish.shorten:
                 pattern = shortened(pattern, places, wish.shorten)
             if wish.kind == "facing":
                 faced |= {stand for stand in stands for place in places if is_beside(pattern, stand, place)}
-        except InputError as error:
-            raise InputError(f"finishing[{number}]: {error}") from None
     pattern = with_stand_facings(pattern, [stand for stand in stands if stand not in faced])
     for number, wish in enumerate(finishing):
-        if wish.kind == "hem":
-            continue
-        try:
-            pattern, places = _opened_up(pattern, wish.edge)
-            if wish.elastic:
-                # Around one limb where the edge has a side.
-                levels = [places[0][1], wish.edge, f"{wish.edge} left"]
-                lengths = {size: wish.elastic * _girth_at(size, levels, girths or {}) for size in pattern.pieces}
-                pattern = replace(
-                    pattern,
-                    elastics=(
-                        *pattern.elastics,
-                        Elastic(edge=wish.edge, width=wish.width, lengths=lengths, count=_count(places)),
-                    ),
-                )
-            if wish.kind == "facing":
-                pattern = with_facings(pattern, places, wish.width, gaps=gaps, stands=stands)
-            elif wish.collar is not None and wish.kind == "hood":
-                heads = {size: _girth_at(size, ["head"], girths or {}) for size in pattern.pieces}
-                pattern = with_hood(pattern, places, wish.collar, heads, gaps=gaps)
-            elif wish.collar is not None and wish.collar.style != "turtleneck":
-                breaks: list[Break] = []
-                if wish.placket:
-                    pattern, breaks = with_placket(pattern, places, wish.placket, wish.edge)
-                    pattern, places = _opened_up(pattern, wish.edge)
-                pattern = with_collar(pattern, places, wish.collar, gaps=gaps, breaks=breaks)
-            elif wish.kind == "flounce":
-                for chain, _ in free_chains(pattern, places, gaps):
-                    pattern = with_flounce(pattern, chain, wish.width, wish.turns, wish.edge, cloth_width)
-            elif wish.kind == "casing":
-                pattern = _with_casing(pattern, places, wish)
-            elif wish.shaped:
-                pattern = with_shaped_waistband(pattern, places, wish.width, gaps=gaps)
-            else:
-                breaks = []
-                if wish.placket:
-                    pattern, breaks = with_slits(pattern, places, wish.placket, "sleeve")
-                    pattern, places = _opened_up(pattern, wish.edge)
-                for chain, count in free_chains(pattern, places, gaps, breaks):
-                    pattern = _with_strip(pattern, wish, chain, count, cloth_width)
-        except InputError as error:
-            raise InputError(f"finishing[{number}]: {error}") from None
+        with _said_of(number):
+            if wish.kind != "hem":
+                pattern = _with_finish(pattern, wish, gaps, stands, girths or {}, cloth_width)
     return pattern
 
 
-def hem_rises(pattern: Pattern, finishing: Sequence[Finishing]) -> dict[tuple[str, str], tuple[FloatArray, FloatArray]]:
+@contextmanager
+def _said_of(number: int) -> Iterator[None]:
+    """Say which finishing an error is about."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"finishing[{number}]: {error}") from None
+
+
+def _with_finish(
+    pattern: Pattern,
+    wish: Finishing,
+    gaps: Collection[str],
+    stands: Sequence[Stand],
+    girths: Mapping[str, Mapping[str, float]],
+    cloth_width: float,
+) -> Pattern:
+    """Return a pattern with one finishing; see :func:`finish_edges`."""
+    pattern, places = _opened_up(pattern, wish.edge)
+    if wish.elastic:
+        # Around one limb where the edge has a side.
+        levels = [places[0][1], wish.edge, f"{wish.edge} left"]
+        lengths = {size: wish.elastic * _girth_at(size, levels, girths) for size in pattern.pieces}
+        # One on each side of the body, or one.
+        count = 2 if any(without_side(edge) != edge for _, edge in places) else 1
+        elastic = Elastic(edge=wish.edge, width=wish.width, lengths=lengths, count=count)
+        pattern = replace(pattern, elastics=(*pattern.elastics, elastic))
+    collar, breaks = wish.collar, list[Break]()
+    if wish.kind == "facing":
+        return with_facings(pattern, places, wish.width, gaps=gaps, stands=stands)
+    if collar is not None and wish.kind == "hood":
+        heads = {size: _girth_at(size, ["head"], girths) for size in pattern.pieces}
+        return with_hood(pattern, places, collar, heads, gaps=gaps)
+    if collar is not None and collar.style != "turtleneck":
+        if wish.placket:
+            pattern, breaks = with_placket(pattern, places, wish.placket, wish.edge)
+            pattern, places = _opened_up(pattern, wish.edge)
+        return with_collar(pattern, places, collar, gaps=gaps, breaks=breaks)
+    if wish.kind == "casing":
+        # Turned in, with an allowance of its width, and the edge turned in once more.
+        wide = wish.width + NARROW
+        return _with_changed_edges(pattern, places, lambda piece, edge: replace(edge, kind="hem", allowance=wide))
+    if wish.shaped:
+        return with_shaped_waistband(pattern, places, wish.width, gaps=gaps)
+    if wish.placket and wish.kind != "flounce":
+        pattern, breaks = with_slits(pattern, places, wish.placket, "sleeve")
+        pattern, places = _opened_up(pattern, wish.edge)
+    for chain, count in free_chains(pattern, places, gaps, breaks):
+        if wish.kind == "flounce":
+            pattern = with_flounce(pattern, chain, wish.width, wish.turns, wish.edge, cloth_width)
+        else:
+            pattern = _with_strip(pattern, wish, chain, count, cloth_width)
+    return pattern
+
+
+def hem_rises(pattern: Pattern, finishing: Sequence[Finishing]) -> dict[Place, tuple[FloatArray, FloatArray]]:
     """Return how wide a strip slanted hems lose in the sample size, as :func:`slant_rises` gives it."""
-    found = dict[tuple[str, str], tuple[FloatArray, FloatArray]]()
+    found = dict[Place, tuple[FloatArray, FloatArray]]()
     for wish in finishing:
         if isinstance(wish.shorten, Mapping):
-            places = _opened_up(pattern, wish.edge, sewn=False)[1]
+            places = _opened_up(pattern, wish.edge, sewn_there=False)[1]
             found |= slant_rises(pattern, places, wish.shorten, pattern.sample)
     return found
 
@@ -195,45 +217,42 @@ def with_plackets(opened: Mapping[str, float], finishing: Sequence[Finishing]) -
     return found
 
 
-def _opened_up(pattern: Pattern, called: str, *, sewn: bool = True) -> tuple[Pattern, list[tuple[str, str]]]:
+def _opened_up(pattern: Pattern, called: str, *, sewn_there: bool = True) -> tuple[Pattern, list[Place]]:
     """Return the free edges of a name, and the pattern with those that were hems as edges to be sewn, unless they stay hems.
 
     Raises:
         InputError: there is none; gives the nearest.
     """
-    taken = {(side.piece, side.edge) for seam in pattern.seams for row in seam.sides for side in row}
-    free = [
-        (piece.name, edge)
+    taken = sewn_places(pattern)
+    free = {
+        (piece.name, edge.name): edge.kind
         for piece in pattern.pieces[pattern.sample]
         for edge in piece.edges
         if (piece.name, edge.name) not in taken
         and (edge.kind == "seam" or (edge.kind == "hem" and piece.role == "shell"))
-    ]
-    names = {edge.name: without_side(edge.name).rstrip(" 0123456789") for _, edge in free}
-    places = [(piece, edge.name) for piece, edge in free if names[edge.name] == called]
+    }
+    names = {edge: without_side(edge).rstrip(" 0123456789") for _, edge in free}
+    places = [place for place in free if names[place[1]] == called]
     if not places:
         raise InputError(f"no free edge {called!r}; {nearest(called, set(names.values()))}")
-    hems = {(piece, edge.name) for piece, edge in free if edge.kind == "hem"} & set(places)
-    if hems and sewn:
-        pieces = {}
-        for size, row in pattern.pieces.items():
-            made = []
-            for piece in row:
-                # As wide as the allowance of the piece's other seams.
-                width = next((edge.width for edge in piece.edges if edge.kind == "seam"), None)
-                edges = [
-                    replace(edge, kind="seam", allowance=width) if (piece.name, edge.name) in hems else edge
-                    for edge in piece.edges
-                ]
-                made.append(replace(piece, edges=edges))
-            pieces[size] = made
-        pattern = replace(pattern, pieces=pieces)
+    hems = [place for place in places if free[place] == "hem"]
+    if hems and sewn_there:
+        # As wide as the allowance of the piece's other seams.
+        pattern = _with_changed_edges(
+            pattern, hems,
+            lambda piece, edge: replace(
+                edge, kind="seam", allowance=next((each.width for each in piece.edges if each.kind == "seam"), None)
+            ),
+        )  # fmt: skip
     return pattern, places
 
 
-def _count(places: Sequence[tuple[str, str]]) -> int:
-    """Return how many rings the garment has of some edges: one on each side of the body, or one."""
-    return 2 if any(without_side(edge) != edge for _, edge in places) else 1
+def _with_changed_edges(pattern: Pattern, places: Sequence[Place], change: Callable[[Piece, Edge], Edge]) -> Pattern:
+    """Return a pattern with edges at some places as `change` returns them."""
+    for name, edge in places:
+        made = [with_edges(piece, {edge: [change(piece, piece.edge(edge))]}) for piece in in_sizes(pattern, name)]
+        pattern = with_pieces(pattern, made)
+    return pattern
 
 
 def _girth_at(size: str, levels: Sequence[str], girths: Mapping[str, Mapping[str, float]]) -> float:
@@ -249,86 +268,53 @@ def _girth_at(size: str, levels: Sequence[str], girths: Mapping[str, Mapping[str
     raise InputError(f"the body has no girth at {levels[0]!r}; {nearest(levels[0], own)}")
 
 
-def _with_casing(pattern: Pattern, places: Sequence[tuple[str, str]], wish: Finishing) -> Pattern:
-    """Return a pattern whose edges are turned in as a casing: an allowance of its width, with the edge turned in once more."""
-    pieces = {}
-    for size, row in pattern.pieces.items():
-        made = []
-        for piece in row:
-            edges = [
-                replace(edge, kind="hem", allowance=wish.width + _NARROW) if (piece.name, edge.name) in places else edge
-                for edge in piece.edges
-            ]
-            made.append(replace(piece, edges=edges))
-        pieces[size] = made
-    return replace(pattern, pieces=pieces)
-
-
 def _with_strip(pattern: Pattern, wish: Finishing, chain: FreeChain, count: int, cloth_width: float) -> Pattern:
     """Return a pattern with one strip along a chain of free edges, cut `count` times.
 
     A strip that is wider than the cloth is cut as equal panels, of which one is drawn. One that is laid in pleats begins and ends in the
     inner fold of a pleat, and so does each of its panels: no seam of them shows.
     """
-    taken = {piece.name for piece in pattern.pieces[pattern.sample]}
-    name = find_unused_name(wish.name, taken)
-    ring = chain.closed and not wish.overlap
+    name, words = free_piece_name(pattern, wish.name), free_piece_name(pattern, wish.name).replace("_", " ")
     lengths = {size: wish.share * chain_length(pattern, chain, size) for size in pattern.pieces}
-    allowance = {
-        size: pattern.piece(chain.sides[0].piece, size).edge(chain.sides[0].edge).width for size in pattern.pieces
-    }
+    allowances = {size: chain_allowance(pattern, chain, size) for size in pattern.pieces}
     folded, (weft, warp), _ = _STRIPS[wish.kind]
     high = wish.width * (2 if folded else 1)
 
     def width_of(panels: int) -> float:
         return max(
-            warp * (length / panels + 2.0 * allowance[size]) + weft * (high + 2.0 * allowance[size])
+            warp * (length / panels + 2.0 * allowances[size]) + weft * (high + 2.0 * allowances[size])
             for size, length in lengths.items()
         )
 
     # What is cut along the cloth is as long as it likes.
     panels = panel_count(width_of, cloth_width) if warp > 0.0 and not wish.overlap else 1
-    pieces = {
-        size: (
-            *row,
-            _strip(
-                wish, name, lengths[size] / panels, row[0],
-                quantity=count * panels, joined=ring or panels > 1, allowance=allowance[size],
-            ),
-        )
+    ring = chain.closed and not wish.overlap
+    joined, quantity = ring or panels > 1, count * panels
+    made = [
+        _strip(wish, name, row[0], lengths[size] / panels, quantity=quantity, joined=joined, allowance=allowances[size])
         for size, row in pattern.pieces.items()
-    }  # fmt: skip
-    called, words = {seam.name for seam in pattern.seams}, name.replace("_", " ")
+    ]
+    pattern = with_pieces(pattern, made)
+    size_notches: dict[str, tuple[float, ...]] = {}
     sided = any(without_side(side.edge) != side.edge for side in chain.sides)
-    whole = tuple(SeamSide(piece=name, edge="lower", copy=copy) for copy in range(panels))
-    sides: tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]] = (whole, chain.sides)
-    ease = 1.0 / wish.share - 1.0
-    if wish.share > 1.0:
-        sides, ease = sides[::-1], wish.share - 1.0
-    sewn = Seam(name=find_unused_name(words, called), sides=sides, ease=ease)
+    notches = None if sided else _centres(pattern, chain)
     if wish.pleat:
         # Lengths of the strip and of its edge fit each other from pleat to pleat alone.
-        size_notches = {}
+        notches = ()
         for size, length in lengths.items():
             row = _pleat_count(wish, length / panels)
             size_notches[size] = tuple((k + (row // 2) / row) / panels for k in range(panels) if row > 1)
-        sewn = replace(sewn, notches=(), size_notches=size_notches)
     elif panels > 1:
-        sewn = replace(sewn, notches=tuple((k + 0.5) / panels for k in range(panels)))
-    else:
-        sewn = replace(sewn, notches=None if sided else _centres(pattern, chain))
-    seams = [*pattern.seams, sewn]
-    called.add(sewn.name)
+        notches = tuple((k + 0.5) / panels for k in range(panels))
+    whole = tuple(SeamSide(piece=name, edge="lower", copy=copy) for copy in range(panels))
+    # The second side is the longer one.
+    sides, longer = ((chain.sides, whole), wish.share) if wish.share > 1.0 else ((whole, chain.sides), 1.0 / wish.share)
+    pattern = sewn(pattern, words, *sides, ease=longer - 1.0, notches=notches, size_notches=size_notches)
     for copy in range(panels if ring else panels - 1):
-        ends = (
-            (SeamSide(piece=name, edge="right end", copy=copy),),
-            (SeamSide(piece=name, edge="left end", reversed=True, copy=(copy + 1) % panels),),
-        )
-        seams.append(
-            Seam(name=find_unused_name(f"{words} ends", called), sides=ends, notches=() if wish.pleat else None)
-        )
-        called.add(seams[-1].name)
-    return replace(pattern, pieces=pieces, seams=seams)
+        following = SeamSide(piece=name, edge="left end", reversed=True, copy=(copy + 1) % panels)
+        end = SeamSide(piece=name, edge="right end", copy=copy)
+        pattern = sewn(pattern, f"{words} ends", end, following, notches=() if wish.pleat else None)
+    return pattern
 
 
 def _pleat_count(wish: Finishing, length: float) -> int:
@@ -352,20 +338,19 @@ def _centres(pattern: Pattern, chain: FreeChain) -> tuple[float, ...]:
 
 
 def _strip(
-    wish: Finishing, name: str, length: float, like: Piece, *, quantity: int, joined: bool, allowance: float
+    wish: Finishing, name: str, like: Piece, length: float, *, quantity: int, joined: bool, allowance: float
 ) -> Piece:
     """Return a straight strip of one size, or a panel of one; `joined` are its ends to each other or to other panels."""
     folded, along, role = _STRIPS[wish.kind]
     high, whole = wish.width * (2 if folded else 1), length + wish.overlap
     # What is turned in has an allowance too, and no seam; a binding's other edge is folded over as it is cut.
-    kinds = dict.fromkeys(("overlap", "upper"), "cut")
-    kinds |= {} if joined else dict.fromkeys(("right end", "left end"), "cut")
-    widths = dict.fromkeys(("lower", "right end", "left end", "upper", "overlap"), allowance)
-    if wish.kind == "binding":
-        widths["upper"] = 0.0
-    elif wish.kind == "ruffle":
-        kinds["upper"], widths["upper"] = "hem", _NARROW
-    edges = strip_edges(*swept(Strip(length=length, height=high)), overlap=wish.overlap, kinds=kinds, allowance=widths)
+    ends = "seam" if joined else "cut"
+    upper = {"binding": ("cut", 0.0), "ruffle": ("hem", NARROW)}.get(wish.kind, ("cut", allowance))
+    edges = strip_edges(
+        *swept(Strip(length=length, height=high)), overlap=wish.overlap,
+        kinds={"overlap": "cut", "upper": upper[0], "right end": ends, "left end": ends},
+        allowance={**dict.fromkeys(("lower", "right end", "left end", "overlap"), allowance), "upper": upper[1]},
+    )  # fmt: skip
     middle, reach = np.array([0.5 * whole, 0.5 * high]), 0.4 * (whole if along[1] == 0.0 else high)
     lines = {"fold line": np.array([[0.0, wish.width], [whole, wish.width]])} if folded else {}
     if wish.pleat:

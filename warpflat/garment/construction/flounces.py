@@ -2,25 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, find_unused_name
+from warpflat.core import FloatArray, InputError
+from warpflat.garment.construction.edges import (
+    beside,
+    free_piece_name,
+    in_sizes,
+    sewn,
+    with_pieces,
+)
 from warpflat.garment.construction.facings import centre_notch
-from warpflat.garment.construction.free_edges import FreeChain, chain_length, neighbour
-from warpflat.garment.construction.strips import CLOTH_WIDTH, Strip, panel_count, strip_edges, swept
-from warpflat.pattern import Pattern, Piece, Seam, SeamSide
+from warpflat.garment.construction.free_edges import FreeChain, chain_allowance, chain_length
+from warpflat.garment.construction.strips import CLOTH_WIDTH, NARROW, Strip, panel_count, strip_edges, swept
+from warpflat.pattern import Edge, Pattern, Piece, SeamSide
 
 __all__ = ["with_flounce"]
 
 # A panel turns by no more [rad]: beyond that its sides would meet.
 _MOST_TURN = np.radians(330.0)
-# Allowance of its hem [m]: a curved hem cannot be turned up far.
-_HEM = 0.010
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Panel:
+    """What falls from one piece.
+
+    Attributes:
+        name: of its piece.
+        ends: names of its right and left end.
+        count: of equal parts, of which one is drawn.
+    """
+
+    name: str
+    ends: tuple[str, str]
+    count: int
+
+    def end(self, side: SeamSide, *, ahead: bool) -> SeamSide:
+        """Return the end of the panel at one end of a side of the chain, from the shell downwards."""
+        # Along the piece's own direction its last edge is met by the panel's left end, which runs upwards.
+        last = ahead != side.reversed
+        copy = self.count - 1 if last else 0
+        return SeamSide(piece=self.name, edge=self.ends[int(last)], mirrored=side.mirrored, reversed=last, copy=copy)
 
 
 def with_flounce(
@@ -42,126 +68,107 @@ def with_flounce(
     Raises:
         InputError: a panel would go around too far.
     """
-    taken = {piece.name for piece in pattern.pieces[pattern.sample]}
-    called_seams, seams = {seam.name for seam in pattern.seams}, list(pattern.seams)
-    pieces = {size: list(row) for size, row in pattern.pieces.items()}
     # What of the chain lies on one piece, or on both copies of one that lies on the fold, gets one panel.
-    groups = [
-        list(row)
-        for _, row in groupby(chain.sides, key=lambda side: (side.piece, _fold(pattern, side) or side.mirrored))
-    ]
-    if chain.closed and len(groups) > 1 and _group_key(pattern, groups[0]) == _group_key(pattern, groups[-1]):
+    groups = [list(row) for _, row in groupby(chain.sides, key=lambda side: _one_panel(pattern, side))]
+    if chain.closed and len(groups) > 1 and _one_panel(pattern, groups[0][0]) == _one_panel(pattern, groups[-1][0]):
         groups[0] = [*groups.pop(), *groups[0]]
-    # By piece its panel, and the names of that one's right and left end.
-    panels: dict[str, tuple[str, tuple[str, str]]] = {}
-    # By panel how many it is parted into.
-    counts: dict[str, int] = {}
+    panels = dict[str, _Panel]()
     for group in groups:
-        name = group[0].piece
-        if name in panels:
-            continue
-        title = find_unused_name(f"{name}_{called}_flounce".replace(" ", "_"), taken)
-        taken.add(title)
-        own = [side for side in group if side.mirrored == group[0].mirrored]
-        own = own[::-1] if own[0].reversed else own
-        sample = pattern.piece(name, pattern.sample)
-        beside = [neighbour(sample, own[0].edge, 0)[0], neighbour(sample, own[-1].edge, 1)[0]]
-        # Named as what runs on beyond it, without number.
-        words = [each.rstrip(" 0123456789") for each in beside]
-        ends = (words[0], words[1] if words[1] != words[0] else f"{words[1]} 2")
-        panels[name] = title, ends
-        folded = [sample.edge(each).kind == "fold" for each in beside]
-        whole = 2.0 if any(folded) else 1.0
-        lengths = {
-            size: whole * chain_length(pattern, FreeChain(sides=tuple(own), closed=False), size) for size in pieces
-        }
-        around = {size: 2.0 * np.pi * turns / chain_length(pattern, chain, size) for size in pieces}
-
-        margins = {size: 2.0 * pattern.piece(name, size).edge(own[0].edge).width for size in pieces}
-        widths_of = [
-            partial(_sector_width, width=width, length=lengths[size], around=around[size], margin=margins[size])
-            for size in pieces
-        ]
-        count = 1 if any(folded) else max(panel_count(width_of, cloth_width) for width_of in widths_of)
-        counts[title] = count
-        for size, row in pieces.items():
-            piece = pattern.piece(name, size)
-            turn = lengths[size] / count * around[size]
-            if turn > _MOST_TURN:
-                raise InputError(
-                    f"a flounce of {turns:g} turns would go around {np.degrees(turn):.0f} degrees in one piece "
-                    f"at {name!r}; at most {np.degrees(_MOST_TURN):.0f} can be cut: take fewer turns"
-                )
-            # Of a panel on the fold half is drawn.
-            lower, upper = _sector(lengths[size] / count, around[size], width)
-            if any(folded):
-                middle = len(lower) // 2
-                kept = slice(0, middle + 1) if folded[0] else slice(middle, None)
-                lower, upper = lower[kept], upper[kept]
-            # Sewn with right sides together, its edge runs against those of the piece: what follows there comes first here.
-            kinds = {
-                "upper": "hem",
-                "right end": "fold" if folded[0] else "seam",
-                "left end": "fold" if folded[1] else "seam",
-            }
-            allowance = piece.edge(own[0].edge).width
-            widths = {key: 0.0 if kinds.get(key) == "fold" else allowance for key in ("lower", "right end", "left end")}
-            names = {"lower": called, "upper": "hem", "right end": ends[0], "left end": ends[1]}
-            # It hangs down.
-            edges = [
-                replace(edge, name=names[edge.name], points=-edge.points)
-                for edge in strip_edges(lower, upper, kinds=kinds, allowance={**widths, "upper": _HEM})
-            ]
-            middle_line = -0.5 * (lower[len(lower) // 2] + upper[len(upper) // 2])
-            row.append(
-                Piece(
-                    name=title, size=size, fabric=piece.fabric, quantity=piece.quantity * count, edges=edges,
-                    paired=piece.paired,
-                    grain=middle_line + np.outer([-0.3 * width, 0.3 * width], [0.0, 1.0]),
-                )
-            )  # fmt: skip
-        seam = find_unused_name(title.replace("_", " "), called_seams)
-        called_seams.add(seam)
-        shell = tuple(SeamSide(piece=name, edge=side.edge) for side in own)
-        notches = centre_notch(sample)
-        seams.append(
-            Seam(
-                name=seam,
-                sides=(
-                    shell,
-                    tuple(SeamSide(piece=title, edge=called, reversed=True, copy=copy) for copy in range(count)),
-                ),
-                notches=notches if count == 1 else None,
-            )
-        )
-        for copy in range(count - 1):
-            # What is last along the shell meets what is first of the next one.
-            ends_here = (
-                (SeamSide(piece=title, edge=ends[1], reversed=True, copy=copy),),
-                (SeamSide(piece=title, edge=ends[0], copy=copy + 1),),
-            )
-            seam = find_unused_name(f"{title.replace('_', ' ')} ends", called_seams)
-            called_seams.add(seam)
-            seams.append(Seam(name=seam, sides=ends_here))
+        if group[0].piece not in panels:
+            pattern, panels[group[0].piece] = _with_panel(pattern, chain, group, width, turns, called, cloth_width)
     joined = set[frozenset[tuple[str, str, bool]]]()
     for group, other in pairwise([*groups, groups[0]] if chain.closed else groups):
-        sides = (
-            _panel_end(panels, counts, group[-1], ahead=True),
-            _panel_end(panels, counts, other[0], ahead=False),
-        )
-        for turned in (False, True):
-            key = frozenset((side.piece, side.edge, side.mirrored != turned) for side in sides)
-            if key in joined:
-                break
-        else:
-            joined.add(frozenset((side.piece, side.edge, side.mirrored) for side in sides))
+        sides = panels[group[-1].piece].end(group[-1], ahead=True), panels[other[0].piece].end(other[0], ahead=False)
+        places = [
+            frozenset((side.piece, side.edge, side.mirrored != turned) for side in sides) for turned in (False, True)
+        ]
+        if joined.isdisjoint(places):
+            joined.add(places[0])
             if all(side.mirrored for side in sides):
-                sides = (replace(sides[0], mirrored=False), replace(sides[1], mirrored=False))
+                sides = replace(sides[0], mirrored=False), replace(sides[1], mirrored=False)
             title = next((side.edge for side in sides if not side.mirrored), sides[0].edge)
-            seam = find_unused_name(f"{title} of the flounce", called_seams)
-            called_seams.add(seam)
-            seams.append(Seam(name=seam, sides=((sides[0],), (sides[1],))))
-    return replace(pattern, pieces=pieces, seams=seams)
+            pattern = sewn(pattern, f"{title} of the flounce", *sides)
+    return pattern
+
+
+def _with_panel(
+    pattern: Pattern,
+    chain: FreeChain,
+    group: Sequence[SeamSide],
+    width: float,
+    turns: float,
+    called: str,
+    cloth_width: float,
+) -> tuple[Pattern, _Panel]:
+    """Return a pattern with the panel along those sides of a chain that lie on one piece, and the panel; see :func:`with_flounce`."""
+    name = group[0].piece
+    title = free_piece_name(pattern, f"{name}_{called}_flounce".replace(" ", "_"))
+    own = [side for side in group if side.mirrored == group[0].mirrored]
+    own = own[::-1] if own[0].reversed else own
+    sample = pattern.piece(name, pattern.sample)
+    neighbours = beside(sample, *(side.edge for side in own))
+    # Named as what runs on beyond it, without number.
+    words = [each.rstrip(" 0123456789") for each in neighbours]
+    ends = (words[0], words[1] if words[1] != words[0] else f"{words[1]} 2")
+    folded = [sample.edge(each).kind == "fold" for each in neighbours]
+    whole, row = (2.0 if any(folded) else 1.0), FreeChain(sides=tuple(own), closed=False)
+    lengths = {size: whole * chain_length(pattern, row, size) for size in pattern.pieces}
+    allowances = {size: chain_allowance(pattern, row, size) for size in pattern.pieces}
+    # How far it turns along the chain [rad/m].
+    around = {size: 2.0 * np.pi * turns / chain_length(pattern, chain, size) for size in pattern.pieces}
+
+    def widest(count: int) -> float:
+        sectors = {size: np.vstack(_sector(length / count, around[size], width)) for size, length in lengths.items()}
+        return max(float(np.ptp(sector[:, 0])) + 2.0 * allowances[size] for size, sector in sectors.items())
+
+    count = 1 if any(folded) else panel_count(widest, cloth_width)
+
+    def draw(piece: Piece) -> Piece:
+        size, length = piece.size, lengths[piece.size] / count
+        turn = length * around[size]
+        if turn > _MOST_TURN:
+            raise InputError(
+                f"a flounce of {turns:g} turns would go around {np.degrees(turn):.0f} degrees in one piece "
+                f"at {name!r}; at most {np.degrees(_MOST_TURN):.0f} can be cut: take fewer turns"
+            )
+        lower, upper = _sector(length, around[size], width)
+        if any(folded):
+            # Half of a panel on the fold is drawn.
+            middle = len(lower) // 2
+            kept = slice(0, middle + 1) if folded[0] else slice(middle, None)
+            lower, upper = lower[kept], upper[kept]
+        # Sewn with right sides together, its edge runs against those of the piece: what follows there comes first here.
+        # A curved hem cannot be turned up far.
+        named = {"lower": (called, "seam", allowances[size]), "upper": ("hem", "hem", NARROW)}
+        for key, end, on_fold in zip(("right end", "left end"), ends, folded, strict=True):
+            named[key] = (end, "fold", 0.0) if on_fold else (end, "seam", allowances[size])
+        # It hangs down.
+        edges = [
+            Edge(name=as_named, points=-edge.points, kind=kind, allowance=allowance)
+            for edge in strip_edges(lower, upper)
+            for as_named, kind, allowance in [named[edge.name]]
+        ]
+        middle_line = -0.5 * (lower[len(lower) // 2] + upper[len(upper) // 2])
+        return Piece(
+                name=title, size=size, fabric=piece.fabric, quantity=piece.quantity * count, edges=edges, paired=piece.paired,
+                grain=middle_line + np.outer([-0.3 * width, 0.3 * width], [0.0, 1.0]),
+            )  # fmt: skip
+
+    pattern = with_pieces(pattern, map(draw, in_sizes(pattern, name)))
+    pattern = sewn(
+        pattern,
+        title.replace("_", " "),
+        tuple(SeamSide(piece=name, edge=side.edge) for side in own),
+        tuple(SeamSide(piece=title, edge=called, reversed=True, copy=copy) for copy in range(count)),
+        notches=centre_notch(sample) if count == 1 else None,
+    )
+    for copy in range(count - 1):
+        # What is last along the shell meets what is first of the next one.
+        last = SeamSide(piece=title, edge=ends[1], reversed=True, copy=copy)
+        pattern = sewn(
+            pattern, f"{title.replace('_', ' ')} ends", last, SeamSide(piece=title, edge=ends[0], copy=copy + 1)
+        )
+    return pattern, _Panel(name=title, ends=ends, count=count)
 
 
 def _sector(length: float, around: float, width: float) -> tuple[FloatArray, FloatArray]:
@@ -169,25 +176,6 @@ def _sector(length: float, around: float, width: float) -> tuple[FloatArray, Flo
     return swept(Strip(length=length, height=width, turn=-0.5 * length * around, even=True))
 
 
-def _sector_width(count: int, *, length: float, around: float, width: float, margin: float) -> float:
-    """Return how wide across the cloth one of so many equal parts of a sector is, with its allowances [m]."""
-    return float(np.ptp(np.vstack(_sector(length / count, around, width))[:, 0])) + margin
-
-
-def _fold(pattern: Pattern, side: SeamSide) -> bool:
-    return pattern.piece(side.piece, pattern.sample).on_fold
-
-
-def _group_key(pattern: Pattern, group: Sequence[SeamSide]) -> tuple[str, bool]:
-    return group[0].piece, _fold(pattern, group[0]) or group[0].mirrored
-
-
-def _panel_end(
-    panels: Mapping[str, tuple[str, tuple[str, str]]], counts: Mapping[str, int], side: SeamSide, *, ahead: bool
-) -> SeamSide:
-    """Return the end of a panel at one end of a side of the chain, from the shell downwards."""
-    title, ends = panels[side.piece]
-    # Along the piece's own direction its last edge is met by the panel's left end, which runs upwards.
-    last = ahead != side.reversed
-    copy = counts[title] - 1 if last else 0
-    return SeamSide(piece=title, edge=ends[int(last)], mirrored=side.mirrored, reversed=last, copy=copy)
+def _one_panel(pattern: Pattern, side: SeamSide) -> tuple[str, bool]:
+    """Return what sides have in common that get one panel: their piece, and its copy, unless both are one on the fold."""
+    return side.piece, pattern.piece(side.piece, pattern.sample).on_fold or side.mirrored

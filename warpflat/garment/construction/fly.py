@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, find_unused_name, part_between
-from warpflat.garment.construction.strips import Strip, strip_edges, swept
+from warpflat.core import InputError, part_between
+from warpflat.garment.construction.edges import (
+    ON,
+    downwards,
+    free_piece_name,
+    in_sizes,
+    neighbour,
+    with_pieces,
+)
+from warpflat.garment.construction.strips import folded_strip
 from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
 
 __all__ = ["with_flies"]
 
 # Width of the facing and, where the waistband has no underlap, of the finished shield; how far both reach below the zip [m].
 _WIDE, _BELOW = 0.040, 0.020
-# What lies this near to a line lies on it [m].
-_ON = 1e-6
 
 
 def with_flies(pattern: Pattern) -> Pattern:
@@ -36,18 +41,14 @@ def with_flies(pattern: Pattern) -> Pattern:
     return pattern
 
 
-def _upper(piece: Piece, side: SeamSide) -> tuple[FloatArray, str]:
-    """Return the points of an edge from its upper end, and the name of the edge above it."""
-    edge, order = piece.edge(side.edge), [each.name for each in piece.edges]
-    grain = np.array([0.0, 1.0]) if piece.grain is None else piece.grain[1] - piece.grain[0]
-    down = bool((edge.points[-1] - edge.points[0]) @ grain < 0.0)
-    at = order.index(side.edge)
-    return (edge.points, order[at - 1]) if down else (edge.points[::-1], order[(at + 1) % len(order)])
+def _above(piece: Piece, name: str) -> str:
+    """Return the name of the edge above another one."""
+    return neighbour(piece, name, 0 if downwards(piece, name)[1] else 1)[0]
 
 
 def _bands_above(pattern: Pattern, side: SeamSide) -> list[str]:
     """Return the waistbands that are sewn to the edge above another one."""
-    above = _upper(pattern.piece(side.piece, pattern.sample), side)[1]
+    above = _above(pattern.piece(side.piece, pattern.sample), side.edge)
     return [
         other.piece
         for seam in pattern.seams
@@ -61,20 +62,19 @@ def _bands_above(pattern: Pattern, side: SeamSide) -> list[str]:
 def _with_fly(pattern: Pattern, seam: Seam, length: float, band: str) -> Pattern:
     import shapely
 
-    side, pieces = seam.sides[1][0], {}
-    taken = {piece.name for piece in pattern.pieces[pattern.sample]}
-    names = [find_unused_name(name, taken) for name in ("fly_facing", "fly_shield")]
-    for size, row in pattern.pieces.items():
-        piece = pattern.piece(side.piece, size)
-        points, above = _upper(piece, side)
-        centre, waist = shapely.LineString(points), shapely.LineString(piece.edge(above).points)
+    side, (facing, shield) = seam.sides[1][0], (free_piece_name(pattern, name) for name in ("fly_facing", "fly_shield"))
+
+    made = list[Piece]()
+    for piece in in_sizes(pattern, side.piece):
+        points = downwards(piece, side.edge)[0]
+        centre, waist = shapely.LineString(points), shapely.LineString(piece.edge(_above(piece, side.edge)).points)
         # As far as the facing's lower end turns to the edge in a quarter of a circle.
         along = shapely.LineString(part_between(points, 0.0, length - _WIDE))
         region = shapely.Polygon(piece.outline).intersection(along.buffer(_WIDE))
         if region.geom_type != "Polygon" or length > centre.length:
             raise InputError(f"a fly of {1e3 * length:.0f} mm finds no room along {side.piece}.{side.edge}")
         ring = np.asarray(shapely.orient_polygons(region).exterior.coords)[:-1]
-        on = [shapely.distance(line, shapely.points(ring)) < _ON for line in (waist, centre)]
+        on = [shapely.distance(line, shapely.points(ring)) < ON for line in (waist, centre)]
         kinds = np.where(on[0] & np.roll(on[0], -1), 0, np.where(on[1] & np.roll(on[1], -1), 1, 2))
         first = next(k for k in range(len(ring)) if kinds[k] != kinds[k - 1])
         kinds, ring = np.roll(kinds, -first), np.roll(ring, -first, axis=0)
@@ -85,20 +85,17 @@ def _with_fly(pattern: Pattern, seam: Seam, length: float, band: str) -> Pattern
             Edge(name=called[kinds[a]], points=closed[a : b + 1], kind="cut", allowance=piece.edge(side.edge).width)
             for a, b in pairwise(ends)
         ]
-        wide = next((edge.length for edge in pattern.piece(band, size).edges if edge.name == "overlap"), _WIDE)
-        outline = strip_edges(
-            *swept(Strip(length=length, height=2.0 * wide)),
-            kinds=dict.fromkeys(("lower", "right end", "upper", "left end"), "cut"),
-            allowance=dict.fromkeys(("lower", "right end", "upper", "left end"), 0.010),
-        )
-        grain = np.array([[0.2 * length, 0.5 * wide], [0.8 * length, 0.5 * wide]])
-        fold = np.array([[0.0, wide], [length, wide]])
-        made = [
-            Piece(name=names[0], size=size, fabric=piece.fabric, edges=edges, role="fly", paired=False, grain=piece.grain),
+        wide = next((edge.length for edge in pattern.piece(band, piece.size).edges if edge.name == "overlap"), _WIDE)
+        made += [
             Piece(
-                name=names[1], size=size, fabric=piece.fabric, edges=outline, role="fly", paired=False, grain=grain,
-                internal_lines={"fold line": fold},
+                name=facing,
+                size=piece.size,
+                fabric=piece.fabric,
+                edges=edges,
+                role="fly",
+                paired=False,
+                grain=piece.grain,
             ),
-        ]  # fmt: skip
-        pieces[size] = (*row, *made)
-    return replace(pattern, pieces=pieces)
+            folded_strip(shield, piece, length, wide, role="fly", grain=(0.2, 0.5)),
+        ]
+    return with_pieces(pattern, made)

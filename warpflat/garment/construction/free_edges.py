@@ -3,32 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core import (
-    FloatArray,
-    arc_lengths,
-    find_unused_name,
-    other_side,
-    points_at_lengths,
-    polyline_length,
-    without_side,
+from warpflat.core import FloatArray, find_unused_name, other_side, points_at_lengths, polyline_length, without_side
+from warpflat.garment.construction.edges import (
+    ON_EDGE,
+    Place,
+    direction,
+    in_sizes,
+    neighbour,
+    parted,
+    runs_down,
+    side_points,
+    with_edges,
+    with_pieces,
 )
-from warpflat.pattern import Pattern, Piece, Seam, SeamSide, drawn_length
+from warpflat.pattern import Pattern, Seam, SeamSide, drawn_length
 
 __all__ = [
     "OFF_END",
     "Break",
     "FreeChain",
+    "chain_allowance",
     "chain_length",
     "free_chain",
     "free_chains",
-    "free_edges",
     "joined_line",
     "marks_of",
-    "neighbour",
     "split_edge",
 ]
 
@@ -39,8 +42,6 @@ Break = tuple[str, str, int]
 
 # Chains of both sides of the body whose lengths differ by no more [m] get one piece, cut twice.
 _ALIKE = 5e-4
-# A line ends on an edge within this distance [m].
-_ON_EDGE = 1e-3
 #: A line meets an edge inside it, not at its ends, beyond this distance [m].
 OFF_END = 2e-3
 # Directions at the ends of edges are those of their first or last so much [m].
@@ -60,21 +61,9 @@ class FreeChain:
     closed: bool
 
 
-def free_edges(pattern: Pattern) -> list[tuple[str, str]]:
-    """Return piece and edge of every edge with a seam's allowance that is in no seam."""
-    sewn = {(side.piece, side.edge) for seam in pattern.seams for row in seam.sides for side in row}
-    pieces = pattern.pieces[pattern.sample]
-    return [
-        (piece.name, edge.name)
-        for piece in pieces
-        for edge in piece.edges
-        if edge.kind == "seam" and (piece.name, edge.name) not in sewn
-    ]
-
-
 def free_chain(
     pattern: Pattern,
-    places: Sequence[tuple[str, str]],
+    places: Sequence[Place],
     gaps: Collection[str] = (),
     breaks: Collection[Break] = (),
 ) -> FreeChain:
@@ -107,7 +96,7 @@ def free_chain(
 
 def free_chains(
     pattern: Pattern,
-    places: Sequence[tuple[str, str]],
+    places: Sequence[Place],
     gaps: Collection[str] = (),
     breaks: Collection[Break] = (),
 ) -> list[tuple[FreeChain, int]]:
@@ -142,6 +131,11 @@ def chain_length(pattern: Pattern, chain: FreeChain, size: str | None = None) ->
     return sum(drawn_length(pattern.piece(side.piece, size).edge(side.edge).points) for side in chain.sides)
 
 
+def chain_allowance(pattern: Pattern, chain: FreeChain, size: str) -> float:
+    """Return the allowance of a chain's first edge [m], which what is sewn to the chain has too."""
+    return pattern.piece(chain.sides[0].piece, size).edge(chain.sides[0].edge).width
+
+
 def _other_end(corner: _Corner) -> _Corner:
     return (*corner[:3], 1 - corner[3])
 
@@ -149,7 +143,7 @@ def _other_end(corner: _Corner) -> _Corner:
 def _next(
     pattern: Pattern,
     corner: _Corner,
-    places: Sequence[tuple[str, str]],
+    places: Sequence[Place],
     gaps: Collection[str],
     breaks: Collection[Break],
 ) -> _Corner | None:
@@ -176,13 +170,6 @@ def _next(
     return (piece, name, mirrored, at) if (piece, name) in places else None
 
 
-def neighbour(piece: Piece, edge: str, end: int) -> tuple[str, int]:
-    """Return the edge that meets another one at its end, and which end of that it is."""
-    names = [each.name for each in piece.edges]
-    at = names.index(edge)
-    return (names[(at + 1) % len(names)], 0) if end == 1 else (names[at - 1], 1)
-
-
 def _across(pattern: Pattern, corner: _Corner, gaps: Collection[str]) -> _Corner | None:
     """Return the corner that a seam sews to another one; None in a gap, or where no seam begins or ends."""
     piece, edge, mirrored, end = corner
@@ -206,13 +193,11 @@ def _across(pattern: Pattern, corner: _Corner, gaps: Collection[str]) -> _Corner
 def _is_open_at(pattern: Pattern, seam: Seam, side: SeamSide, at_start: bool) -> bool:
     """Return whether a seam whose upper end is open is so at an end of one of its sides: at the lower one if all of it opens."""
     piece = pattern.piece(side.piece, pattern.sample)
-    points = piece.edge(side.edge).points[:: -1 if side.reversed else 1]
-    grain = np.array([0.0, 1.0]) if piece.grain is None else piece.grain[1] - piece.grain[0]
-    upwards = bool((points[-1] - points[0]) @ grain > 0.0)
-    return at_start != upwards or any(opening.whole for opening in seam.openings)
+    down = runs_down(piece, side_points(pattern, side, pattern.sample))
+    return at_start == down or any(opening.whole for opening in seam.openings)
 
 
-def split_edge(pattern: Pattern, place: tuple[str, str], at: Mapping[str, float]) -> tuple[Pattern, Break]:
+def split_edge(pattern: Pattern, place: Place, at: Mapping[str, float]) -> tuple[Pattern, Break]:
     """Return a pattern with an edge in two, and the end of the first part at which a chain is to be broken.
 
     Args:
@@ -224,23 +209,10 @@ def split_edge(pattern: Pattern, place: tuple[str, str], at: Mapping[str, float]
     sample = pattern.piece(name, pattern.sample)
     new = find_unused_name(edge, {each.name for each in sample.edges})
     names = (edge, new) if at[pattern.sample] > 0.5 * sample.edge(edge).length else (new, edge)
-    pieces = {}
-    for size, row in pattern.pieces.items():
-        made = []
-        for piece in row:
-            if piece.name == name:
-                whole = piece.edge(edge)
-                lengths, corner = arc_lengths(whole.points), points_at_lengths(whole.points, [at[size]])
-                parts = (
-                    np.vstack([whole.points[lengths < at[size] - 1e-7], corner]),
-                    np.vstack([corner, whole.points[lengths > at[size] + 1e-7]]),
-                )
-                halves = [replace(whole, name=n, points=p, vertices=None) for n, p in zip(names, parts, strict=True)]
-                edges = [half for each in piece.edges for half in (halves if each.name == edge else [each])]
-                piece = replace(piece, edges=edges)
-            made.append(piece)
-        pieces[size] = made
-    return replace(pattern, pieces=pieces), (name, names[0], 1)
+    made = [
+        with_edges(piece, {edge: parted(piece.edge(edge), at[piece.size], names)}) for piece in in_sizes(pattern, name)
+    ]
+    return with_pieces(pattern, made), (name, names[0], 1)
 
 
 def marks_of(pattern: Pattern, chain: FreeChain, size: str, line: str) -> list[float]:
@@ -250,13 +222,13 @@ def marks_of(pattern: Pattern, chain: FreeChain, size: str, line: str) -> list[f
     found, before = list[float](), 0.0
     for side in chain.sides:
         piece = pattern.piece(side.piece, size)
-        points = piece.edge(side.edge).points[:: -1 if side.reversed else 1]
+        points = side_points(pattern, side, size)
         drawn = shapely.LineString(points)
         known = {**piece.internal_lines, **{each.name: each.points for each in piece.edges if each.name != side.edge}}
         lines = [each for name, each in known.items() if name.rstrip(" 0123456789") == line]
         for end in (shapely.Point(each[k]) for each in lines for k in (0, -1)):
             at = before + float(drawn.project(end))
-            if drawn.distance(end) < _ON_EDGE and all(abs(at - other) > OFF_END for other in found):
+            if drawn.distance(end) < ON_EDGE and all(abs(at - other) > OFF_END for other in found):
                 found.append(at)
         before += polyline_length(points)
     return sorted(found)
@@ -273,36 +245,29 @@ def joined_line(pattern: Pattern, chain: FreeChain, size: str, *, lapped: float 
         size: of the pieces.
         lapped: by how much pieces are turned over each other at the seams [rad], as for a collar that is to roll.
     """
-    lines, corners = list[FloatArray](), list[tuple[str, float, float]]()
+    line, before, ray = np.empty((0, 2)), ("", False, ""), np.zeros(2)
     for side in chain.sides:
         piece = pattern.piece(side.piece, size)
-        points = piece.edge(side.edge).points[:: -1 if side.reversed else 1]
-        # The corners of the edge: its neighbours there, and the angles of the cloth.
-        angles = []
-        for end in (0, 1):
-            name, at = neighbour(piece, side.edge, end)
-            beside = piece.edge(name).points[:: -1 if at else 1]
-            own = piece.edge(side.edge).points[:: -1 if end else 1]
-            (x, y), (u, v) = _direction(own), _direction(beside)
-            angles.append((name, abs(float(np.arctan2(x * v - y * u, x * u + y * v)))))
-        angles = angles[::-1] if side.reversed else angles
-        corners.append((angles[1][0], angles[0][1], angles[1][1]))
         # Walked against its own direction, an edge has the cloth to its right; so has a copy that is turned over, walked along it.
-        lines.append(points * [1.0, -1.0] if side.reversed else points)
-    line = lines[0]
-    for number, points in enumerate(lines[1:], start=1):
-        ahead, first = -_direction(line[::-1]), _direction(points)
-        name, _, leaving = corners[number - 1]
-        before, side = chain.sides[number - 1], chain.sides[number]
-        on_one_piece = (before.piece, before.mirrored, name) == (side.piece, side.mirrored, side.edge)
-        turn = np.pi - leaving - (0.0 if on_one_piece else corners[number][1] - lapped)
-        by = turn + float(np.arctan2(ahead[1], ahead[0]) - np.arctan2(first[1], first[0]))
-        rotation = np.array([[np.cos(by), np.sin(by)], [-np.sin(by), np.cos(by)]])
-        line = np.vstack([line, line[-1] + (points[1:] - points[0]) @ rotation])
+        flip = np.array([1.0, -1.0 if side.reversed else 1.0])
+        points = side_points(pattern, side, size) * flip
+        # The edges that meet it at both ends, and how they run from there.
+        names, at = zip(*(neighbour(piece, side.edge, end != side.reversed) for end in (0, 1)), strict=True)
+        rays = [
+            _heading(piece.edge(name).points[:: -1 if end else 1]) * flip for name, end in zip(names, at, strict=True)
+        ]
+        if not len(line):
+            line = points
+        else:
+            goes_on = before == (side.piece, side.mirrored, side.edge)
+            (x, y), (u, v) = _heading(points) if goes_on else rays[0], ray
+            by = float(np.arctan2(x * v - y * u, x * u + y * v)) + (0.0 if goes_on else lapped)
+            rotation = np.array([[np.cos(by), np.sin(by)], [-np.sin(by), np.cos(by)]])
+            line, rays[1] = np.vstack([line, line[-1] + (points[1:] - points[0]) @ rotation]), rays[1] @ rotation
+        before, ray = (side.piece, side.mirrored, names[1]), rays[1]
     return line
 
 
-def _direction(points: FloatArray) -> FloatArray:
+def _heading(points: FloatArray) -> FloatArray:
     """Return the direction in which a line begins."""
-    ahead = points_at_lengths(points, [_NEAR_END])[0] - points[0]
-    return np.asarray(ahead / np.linalg.norm(ahead))
+    return direction(np.array([points[0], points_at_lengths(points, _NEAR_END)]))

@@ -13,7 +13,6 @@ import numpy as np
 from warpflat.core import (
     FloatArray,
     InputError,
-    arc_lengths,
     find_unused_name,
     nearest,
     other_side,
@@ -21,9 +20,23 @@ from warpflat.core import (
     points_at_lengths,
     polyline_length,
 )
-from warpflat.garment.construction.mark_openings import lines_inside, with_notches
-from warpflat.garment.construction.strips import Strip, strip_edges, swept
-from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
+from warpflat.garment.construction.edges import (
+    backwards,
+    beside,
+    copies_sewn,
+    downwards,
+    free_piece_name,
+    in_sizes,
+    polygon_edges,
+    sewn,
+    trimmed,
+    up_and_across,
+    with_edges,
+    with_pieces,
+)
+from warpflat.garment.construction.mark_openings import with_notches
+from warpflat.garment.construction.strips import NARROW, Strip, folded_strip, strip_edges, swept
+from warpflat.pattern import Edge, Pattern, Piece, SeamSide
 
 __all__ = ["Pocket", "add_pockets"]
 
@@ -86,92 +99,100 @@ def add_pockets(pattern: Pattern, pockets: Sequence[Pocket]) -> Pattern:
 
 def _with_placed(pattern: Pattern, pocket: Pocket) -> Pattern:
     """Return a pattern with a patch or welt pocket and its place, on both sides of a piece that has both."""
+    # By size what is made smaller for a short line, and how many the garment has.
+    fitted, counts = dict[str, Pocket](), dict[str, int]()
+    for size in pattern.pieces:
+        like = pattern.piece(pocket.where, size)
+        line = _line_of(like, pocket.line)
+        smaller = min(1.0, pocket.most_share * polyline_length(line) / pocket.width)
+        keys = ("width", "height", "below", "from_centre")
+        fitted[size] = replace(pocket, **{key: smaller * getattr(pocket, key) for key in keys})
+
+    def placed(piece: Piece) -> Piece:
+        places = _places(piece, fitted[piece.size])
+        counts[piece.size] = len(places) * piece.quantity * (2 if piece.on_fold else 1)
+        lines, marks = dict(piece.internal_lines), dict(piece.marks)
+        for place in places:
+            # Side by side, so that its corners stay sharp; the upper edge of a patch is left open.
+            for ends in pairwise([*place[1:], place[0]] if pocket.kind == "patch" else [*place, place[0]]):
+                lines[find_unused_name("pocket", lines)] = np.array(ends)
+            for corner in place[:2]:
+                marks[find_unused_name("pocket corner", marks)] = corner
+        return replace(piece, internal_lines=lines, marks=marks)
+
+    pattern = with_pieces(pattern, map(placed, in_sizes(pattern, pocket.where)))
+    patch, welt, bag = (
+        free_piece_name(pattern, f"{pocket.where}_{what}") for what in ("pocket", "pocket_welt", "pocket_bag")
+    )
+
+    made = list[Piece]()
+    for like in in_sizes(pattern, pocket.where):
+        here, count = fitted[like.size], counts[like.size]
+        if pocket.kind == "patch":
+            names = ("upper", "left side", "lower left", "lower right", "right side")
+            edges = polygon_edges(names, _shape(here), kind="cut", allowance=NARROW)
+            edges = [replace(edges[0], kind="hem", allowance=_HEM), *edges[1:]]
+            made.append(_pocket_piece(patch, like, edges, count))
+        else:
+            long = here.width + 2 * _WELT_ENDS
+            bag_edges = strip_edges(
+                *swept(Strip(length=here.width + 2 * _BESIDE, height=here.height)), kinds="cut", allowance=NARROW
+            )
+            made += [
+                folded_strip(welt, like, long, here.welt, role="pocket", quantity=count),
+                _pocket_piece(bag, like, bag_edges, 2 * count),
+            ]
+    return with_pieces(pattern, made)
+
+
+def _pocket_piece(name: str, like: Piece, edges: Sequence[Edge], quantity: int, **other: Any) -> Piece:
+    return Piece(
+        name=name, size=like.size, fabric=like.fabric, quantity=quantity, edges=edges, role="pocket",
+        **{"paired": False, **other},
+    )  # fmt: skip
+
+
+def _line_of(piece: Piece, name: str) -> FloatArray:
+    """Return a line inside a piece or an edge of it.
+
+    Raises:
+        InputError: it has none; gives the nearest.
+    """
+    known = {**{edge.name: edge.points for edge in piece.edges}, **piece.internal_lines}
+    if name not in known:
+        raise InputError(f"piece {piece.name!r} has no line {name!r}; {nearest(name, known)}")
+    return known[name]
+
+
+def _shape(pocket: Pocket) -> FloatArray:
+    """Return the corners of a patch, or of the opening of a welt, from its upper right one leftwards; its upper edge lies along y = 0."""
+    half, high = 0.5 * pocket.width, pocket.height if pocket.kind == "patch" else pocket.welt
+    corners = np.array([(half, 0.0), (-half, 0.0), (-half, -high), (0.0, -high - _POINT), (half, -high)])
+    return corners if pocket.kind == "patch" else corners[[0, 1, 2, 4]]
+
+
+def _places(piece: Piece, pocket: Pocket) -> list[FloatArray]:
+    """Return the corners of a patch or welt pocket wherever it lies on a piece.
+
+    Raises:
+        InputError: it does not lie on it.
+    """
     import shapely
 
-    asked, pieces = pocket, {}
-    for size, row in pattern.pieces.items():
-        like = pattern.piece(asked.where, size)
-        known = {**{edge.name: edge.points for edge in like.edges}, **like.internal_lines}
-        if asked.line not in known:
-            raise InputError(f"piece {like.name!r} has no line {asked.line!r}; {nearest(asked.line, known)}")
-        smaller = min(1.0, asked.most_share * polyline_length(known[asked.line]) / asked.width)
-        pocket = replace(
-            asked,
-            **{key: smaller * getattr(asked, key) for key in ("width", "height", "below", "from_centre")},
+    up, across = up_and_across(piece)
+    level, high = _line_of(piece, pocket.line), pocket.height if pocket.kind == "patch" else pocket.welt
+    order = np.argsort(level @ across)
+    found = []
+    for middle in _middles(piece, pocket, across, float((level @ up).mean()) - pocket.below - 0.5 * high):
+        top = float(np.interp(middle, (level @ across)[order], (level @ up)[order])) - pocket.below
+        place = (np.array([middle, top]) + _shape(pocket)) @ [across, up]
+        if shapely.Polygon(piece.outline).contains(shapely.Polygon(place)):
+            found.append(place)
+    if not found:
+        raise InputError(
+            f"a pocket {1e3 * pocket.width:.0f} by {1e3 * high:.0f} mm does not lie on {piece.name!r} there"
         )
-        half, high = 0.5 * pocket.width, pocket.height if pocket.kind == "patch" else pocket.welt
-        # Of a patch on the right of the centre line, from its upper right corner leftwards.
-        shape = [(half, 0.0), (-half, 0.0), (-half, -high), (0.0, -high - _POINT), (half, -high)]
-        shape = shape if pocket.kind == "patch" else [*shape[:3], shape[4]]
-        made = list[Piece]()
-        count = 0
-        for piece in row:
-            if piece.name != pocket.where:
-                made.append(piece)
-                continue
-            grain = np.array([[0.0, 0.0], [0.0, 1.0]]) if piece.grain is None else piece.grain
-            up = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
-            across = np.array([up[1], -up[0]])
-            level = known[pocket.line]
-            order = np.argsort(level @ across)
-            lines, marks = dict(piece.internal_lines), dict(piece.marks)
-            body = shapely.Polygon(piece.outline)
-            middle_of_level = float((level @ up).mean()) - pocket.below - 0.5 * high
-            for middle in _middles(piece, pocket, across, middle_of_level):
-                top = float(np.interp(middle, (level @ across)[order], (level @ up)[order])) - pocket.below
-                place = np.array([(middle + x) * across + (top + y) * up for x, y in shape])
-                if not body.contains(shapely.Polygon(place)):
-                    continue
-                count += 1
-                # Side by side, so that its corners stay sharp; the upper edge of a patch is left open.
-                sides = [*place[1:], place[0]] if pocket.kind == "patch" else [*place, place[0]]
-                for ends in pairwise(sides):
-                    lines[find_unused_name("pocket", lines)] = np.array(ends)
-                for corner in place[:2]:
-                    marks[find_unused_name("pocket corner", marks)] = corner
-            if not count:
-                raise InputError(
-                    f"a pocket {1e3 * pocket.width:.0f} by {1e3 * high:.0f} mm does not lie on {piece.name!r} there"
-                )
-            made.append(replace(piece, internal_lines=lines, marks=marks))
-            count *= piece.quantity * (2 if piece.on_fold else 1)
-        # The piece of a patch, or welt and bags.
-        if pocket.kind == "patch":
-            names = ["upper", "left side", "lower left", "lower right", "right side"]
-            patch = np.array(shape)
-            outlines = {
-                "pocket": [
-                    Edge(
-                        name=name, points=patch[[k, (k + 1) % 5]], kind="hem" if k == 0 else "cut",
-                        allowance=_HEM if k == 0 else 0.010,
-                    )
-                    for k, name in enumerate(names)
-                ]
-            }  # fmt: skip
-        else:
-            outlines = {}
-            for what, long, tall in (
-                ("pocket_welt", pocket.width + 2 * _WELT_ENDS, 2 * pocket.welt),
-                ("pocket_bag", pocket.width + 2 * _BESIDE, pocket.height),
-            ):
-                names = ["lower", "right end", "upper", "left end"]
-                outlines[what] = strip_edges(
-                    *swept(Strip(length=long, height=tall)),
-                    kinds=dict.fromkeys(names, "cut"),
-                    allowance=dict.fromkeys(names, 0.010),
-                )
-        for what, edges in outlines.items():
-            title = find_unused_name(f"{pocket.where}_{what}", {piece.name for piece in pattern.pieces[pattern.sample]})
-            fold = np.array([[0.0, pocket.welt], [pocket.width + 2 * _WELT_ENDS, pocket.welt]])
-            made.append(
-                Piece(
-                    name=title, size=like.size, fabric=like.fabric, quantity=count * (2 if what == "pocket_bag" else 1),
-                    edges=edges, role="pocket", paired=False,
-                    internal_lines={"fold line": fold} if what == "pocket_welt" else {},
-                )
-            )  # fmt: skip
-        pieces[size] = made
-    return replace(pattern, pieces=pieces)
+    return found
 
 
 def _middles(piece: Piece, pocket: Pocket, across: FloatArray, level: float) -> list[float]:
@@ -222,153 +243,128 @@ def _with_hip_pocket(pattern: Pattern, pocket: Pocket) -> Pattern:
 
 def _cut_hip_pocket(pattern: Pattern, pocket: Pocket, front: SeamSide) -> Pattern:
     """Return a pattern with a hip pocket in one piece, whose edge lies in the seam."""
-    import shapely
-
-    sample, taken = pattern.piece(front.piece, pattern.sample), {piece.name for piece in pattern.pieces[pattern.sample]}
-    behind = find_unused_name(f"{front.piece}_pocket_facing", taken)
-    bag = find_unused_name(f"{front.piece}_pocket_bag", taken)
+    sample = pattern.piece(front.piece, pattern.sample)
+    facing, bag = (free_piece_name(pattern, f"{front.piece}_pocket_{what}") for what in ("facing", "bag"))
     opening = find_unused_name("pocket opening", {edge.name for edge in sample.edges})
-    order = [edge.name for edge in sample.edges]
-    at = order.index(front.edge)
     # The upper edge comes before the side's where that runs downwards.
-    first = bool(np.array_equal(_downwards(sample, front)[0][0], sample.edge(front.edge).points[0]))
-    upper = order[at - 1] if first else order[(at + 1) % len(order)]
-    pieces = {}
-    for size, row in pattern.pieces.items():
-        piece = pattern.piece(front.piece, size)
-        # Both edges from their corner.
-        lines = {
-            upper: piece.edge(upper).points[:: -1 if first else 1],
-            front.edge: piece.edge(front.edge).points[:: 1 if first else -1],
-        }
-        cuts = {upper: pocket.width, front.edge: pocket.height}
-        for name, cut in cuts.items():
-            whole = float(arc_lengths(lines[name])[-1])
-            if cut > whole - _CLEAR:
-                raise InputError(
-                    f"the pocket ends {1e3 * cut:.0f} mm along {name!r}, which is {1e3 * whole:.0f} mm long"
-                )
-        # The bag lies in a box below the corner, whose lower inner corner is cut off.
-        grain = np.array([[0.0, 0.0], [0.0, 1.0]]) if piece.grain is None else piece.grain
-        up = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
-        corner, across = lines[upper][0], np.array([up[1], -up[0]])
-        across = across if (lines[upper][-1] - corner) @ across > 0 else -across
-        inward, low, slope = pocket.width + _INWARDS, -pocket.height - _DEEPER, 0.35 * pocket.width + 0.02
-        box = [(-0.3, 0.3), (inward, 0.3), (inward, low + slope), (inward - slope, low), (-0.3, low)]
-        region = shapely.Polygon(piece.outline).intersection(
-            shapely.Polygon([corner + x * across + y * up for x, y in box])
-        )
-        if region.geom_type != "Polygon" or not 0.0 < region.area < 0.8 * shapely.Polygon(piece.outline).area:
-            raise InputError(f"the bag of a hip pocket finds no room on {piece.name!r}")
-        # Where the region's outline leaves both edges.
-        inside = {}
-        for name, line in lines.items():
-            both = shapely.LineString(line).intersection(region.buffer(1e-7))
-            inside[name] = max(float(both.length), cuts[name] + 0.01)
-            if inside[name] > float(arc_lengths(line)[-1]) - 1e-3:
-                raise InputError(f"the bag of a hip pocket is deeper than {name!r} of {piece.name!r} is long")
-        parts = {
-            name: [part_between(line, *ends) for ends in pairwise([0.0, cuts[name], inside[name], np.inf])]
-            for name, line in lines.items()
-        }
-        ring = np.asarray(region.exterior.coords)[:-1]
-        ends = [parts[name][1][-1] for name in (upper, front.edge)]
-        rim = _between_ends(ring, ends[0], ends[1], corner)
-        straight = np.array([parts[upper][0][-1], parts[front.edge][0][-1]])
-        own, side = piece.edge(upper), piece.edge(front.edge)
-        under: dict[str, Any] = {"kind": "cut", "allowance": 0.010}
-        # From the corner along the side, around and back along the upper edge, then turned into the outline's direction.
-        facing_rows: list[tuple[str, FloatArray, dict[str, Any]]] = [
-            (upper, parts[upper][0][::-1], {"kind": own.kind, "allowance": own.allowance}),
-            (front.edge, parts[front.edge][0], {"kind": side.kind, "allowance": side.allowance}),
-            (f"{front.edge} under", parts[front.edge][1], under),
-            ("rim", rim[::-1], {"as_drawn": True}),
-            (f"{upper} under", parts[upper][1][::-1], under),
-        ]
-        bag_rows: list[tuple[str, FloatArray, dict[str, Any]]] = [
-            (opening, straight, {}),
-            (f"{front.edge} under", parts[front.edge][1], under),
-            ("rim", rim[::-1], {"as_drawn": True}),
-            (f"{upper} under", parts[upper][1][::-1], under),
-        ]
-        panel_rows = {
-            upper: np.vstack([parts[upper][1][:-1], parts[upper][2]])[::-1],
-            front.edge: np.vstack([parts[front.edge][1][:-1], parts[front.edge][2]]),
-        }
-        new = []
-        for edge in piece.edges:
-            if edge.name in panel_rows:
-                points = panel_rows[edge.name] if first else panel_rows[edge.name][::-1]
-                kept = replace(edge, points=points, vertices=None)
-                cut_edge = Edge(name=opening, points=straight if first else straight[::-1])
-                if edge.name == front.edge:
-                    new += [cut_edge, kept] if first else [kept, cut_edge]
-                else:
-                    new.append(kept)
-            else:
-                new.append(edge)
-        left = shapely.Polygon(np.concatenate([edge.points[:-1] for edge in new])).buffer(1e-9)
-        kept_lines = lines_inside(piece.internal_lines, np.concatenate([edge.points[:-1] for edge in new]))
-        marks = {name: mark for name, mark in piece.marks.items() if left.contains(shapely.Point(mark))}
-        cut_panel = replace(piece, edges=new, internal_lines=kept_lines, marks=marks)
-        made = []
-        for name, parts_of in ((behind, facing_rows), (bag, bag_rows)):
-            edges = [
-                Edge(name=n, points=p if first else p[::-1], **k) for n, p, k in (parts_of if first else parts_of[::-1])
-            ]
-            middle = np.asarray(region.centroid.coords)[0]
-            count = piece.quantity * (2 if piece.on_fold else 1)
-            made.append(
-                Piece(
-                    name=name, size=piece.size, fabric=piece.fabric, quantity=count, edges=edges, role="pocket",
-                    grain=middle + np.outer([-0.05, 0.05], up),
-                )
-            )  # fmt: skip
-        pieces[size] = [*(cut_panel if each.name == piece.name else each for each in row), *made]
+    first = downwards(sample, front.edge)[1]
+    upper = beside(sample, front.edge)[0 if first else 1]
+    made = list[Piece]()
+    for piece in in_sizes(pattern, front.piece):
+        made += _hip_pocket(piece, pocket, upper, front.edge, (opening, facing, bag), first=first)
+    pattern = with_pieces(pattern, made)
+
+    def both(side: SeamSide) -> list[SeamSide]:
+        if side.piece != front.piece or side.edge not in (upper, front.edge):
+            return [side]
+        # The corner lies at the end of the upper edge where that comes first.
+        corner_last = (first if side.edge == upper else not first) != side.reversed
+        return [side, replace(side, piece=facing)][:: 1 if corner_last else -1]
+
     seams = []
     for seam in pattern.seams:
-        rows = list[tuple[SeamSide, ...]]()
-        for own_row in seam.sides:
-            sides = list[SeamSide]()
-            for each in own_row:
-                if each.piece != front.piece or each.edge not in (upper, front.edge):
-                    sides.append(each)
-                    continue
-                # The corner lies at the end of the upper edge where that comes first.
-                corner_last = (first if each.edge == upper else not first) != each.reversed
-                both = [each, replace(each, piece=behind)]
-                sides += both if corner_last else both[::-1]
-            rows.append(tuple(sides))
-        seams.append(replace(seam, sides=(rows[0], rows[1])))
-    taken = {seam.name for seam in seams}
-    for words, panel, name, along in (
-        ("pocket opening", front.piece, bag, opening),
-        ("pocket bag", behind, bag, "rim"),
-    ):
-        title = find_unused_name(words, taken)
-        taken.add(title)
-        seams.append(
-            Seam(
-                name=title,
-                sides=((SeamSide(piece=panel, edge=along),), (SeamSide(piece=name, edge=along, mirrored=True),)),
-            )
-        )
-    return replace(pattern, pieces=pieces, seams=seams)
+        one, other = (tuple(each for side in row for each in both(side)) for row in seam.sides)
+        seams.append(replace(seam, sides=(one, other)))
+    pattern = replace(pattern, seams=seams)
+    for words, panel, edge in (("pocket opening", front.piece, opening), ("pocket bag", facing, "rim")):
+        pattern = sewn(pattern, words, SeamSide(piece=panel, edge=edge), SeamSide(piece=bag, edge=edge, mirrored=True))
+    return pattern
 
 
-def _between_ends(ring: FloatArray, start: FloatArray, end: FloatArray, beside: FloatArray) -> FloatArray:
-    """Return the part of a closed line (#P by 2 [m]) from one of its points to another that keeps away from a third."""
+def _hip_pocket(
+    piece: Piece, pocket: Pocket, upper: str, side: str, names: tuple[str, str, str], *, first: bool
+) -> tuple[Piece, Piece, Piece]:
+    """Return a piece without its corner, what takes the corner's place, and the bag.
+
+    Args:
+        piece: with the pocket.
+        pocket: how far along both edges it opens.
+        upper, side: edges that meet in the corner.
+        names: of the edge at the opening, of the pocket's facing and of its bag.
+        first: whether the upper edge comes before the other one in the outline.
+
+    Raises:
+        InputError: the bag finds no room.
+    """
     import shapely
 
-    closed = shapely.LineString(np.vstack([ring, ring[:1]]))
-    whole, (a, b, c) = closed.length, (float(closed.project(shapely.Point(p))) for p in (start, end, beside))
-    forward = (b - a) % whole
-    line = np.vstack([ring, ring[:1]])
-    if (c - a) % whole < forward:
-        line, a, forward = line[::-1], whole - a, whole - forward
-    part = part_between(np.vstack([line[:-1], line]), a, a + forward)
+    opening, facing, bag = names
+    # Both edges from their corner.
+    lines = {
+        upper: piece.edge(upper).points[:: -1 if first else 1],
+        side: piece.edge(side).points[:: 1 if first else -1],
+    }
+    cuts = {upper: pocket.width, side: pocket.height}
+    for name, cut in cuts.items():
+        _check_end(cut, name, piece.edge(name).length)
+    # The bag lies in a box below the corner, whose lower inner corner is cut off.
+    corner, (up, across) = lines[upper][0], up_and_across(piece)
+    across = across if (lines[upper][-1] - corner) @ across > 0 else -across
+    inward, low, slope = pocket.width + _INWARDS, -pocket.height - _DEEPER, 0.35 * pocket.width + 0.02
+    box = np.array([(-0.3, 0.3), (inward, 0.3), (inward, low + slope), (inward - slope, low), (-0.3, low)])
+    whole = shapely.Polygon(piece.outline)
+    region = whole.intersection(shapely.Polygon(corner + box @ [across, up]))
+    if region.geom_type != "Polygon" or not 0.0 < region.area < 0.8 * whole.area:
+        raise InputError(f"the bag of a hip pocket finds no room on {piece.name!r}")
+    # Each edge along the opening, along the bag, and beyond that.
+    parts = {}
+    for name, line in lines.items():
+        inside = max(float(shapely.LineString(line).intersection(region.buffer(1e-7)).length), cuts[name] + 0.01)
+        if inside > piece.edge(name).length - 1e-3:
+            raise InputError(f"the bag of a hip pocket is deeper than {name!r} of {piece.name!r} is long")
+        parts[name] = [part_between(line, *ends) for ends in pairwise([0.0, cuts[name], inside, np.inf])]
+    rim = _between_ends(np.asarray(region.exterior.coords), parts[side][1][-1], parts[upper][1][-1], corner)
+    straight = Edge(name=opening, points=np.array([parts[upper][0][-1], parts[side][0][-1]]))
+
+    def part(name: str, *lines: FloatArray) -> Edge:
+        joined = np.vstack([*(line[:-1] for line in lines[:-1]), lines[-1]])
+        return replace(piece.edge(name), points=joined[:: -1 if name == upper else 1], vertices=None)
+
+    def under(name: str) -> Edge:
+        return replace(part(name, parts[name][1]), name=f"{name} under", kind="cut", allowance=NARROW)
+
+    # From the corner along the side, around and back along the upper edge.
+    around = [under(side), Edge(name="rim", points=rim, as_drawn=True), under(upper)]
+    of_facing = [part(upper, parts[upper][0]), part(side, parts[side][0]), *around]
+    of_bag = [straight, *around]
+    # The opening stands before or behind the side's edge.
+    left = {upper: [part(upper, *parts[upper][1:])], side: [straight, part(side, *parts[side][1:])]}
+    if not first:
+        of_facing, of_bag = backwards(of_facing), backwards(of_bag)
+        left = {name: backwards(row) for name, row in left.items()}
+    panel = with_edges(piece, left)
+    like = {
+        "paired": True, "grain": shapely.get_coordinates(region.centroid)[0] + np.outer([-0.05, 0.05], up),
+        "quantity": piece.quantity * (2 if piece.on_fold else 1),
+    }  # fmt: skip
+    return (
+        trimmed(panel, panel.edges),
+        _pocket_piece(facing, piece, of_facing, **like),
+        _pocket_piece(bag, piece, of_bag, **like),
+    )
+
+
+def _between_ends(ring: FloatArray, start: FloatArray, end: FloatArray, away: FloatArray) -> FloatArray:
+    """Return the part of a closed line (#P by 2 [m], the first point repeated) from one of its points to another, away from a third."""
+    import shapely
+
+    places, whole = shapely.LineString(ring).project(shapely.points([start, end, away])), polyline_length(ring)
+    forward, there = (places[1:] - places[0]) % whole
+    if there < forward:
+        return _between_ends(ring[::-1], start, end, away)
+    part = part_between(np.vstack([ring[:-1], ring]), places[0], places[0] + forward)
     part[[0, -1]] = start, end
     return part
+
+
+def _check_end(end: float, called: str, whole: float) -> None:
+    """Check that an opening ends above the lower end of a seam or an edge.
+
+    Raises:
+        InputError: it does not.
+    """
+    if end > whole - _CLEAR:
+        raise InputError(f"the pocket ends {1e3 * end:.0f} mm along {called!r}, which is {1e3 * whole:.0f} mm long")
 
 
 def _with_bags(pattern: Pattern, pocket: Pocket) -> Pattern:
@@ -380,70 +376,41 @@ def _with_bags(pattern: Pattern, pocket: Pocket) -> Pattern:
             f"no seam {pocket.where!r} between two edges; {nearest(pocket.where, [seam.name for seam in pattern.seams])}"
         )
     # Of halves, and of pieces that are cut in pairs, one seam is listed for both sides.
-    sewn = [pattern.piece(side.piece, pattern.sample) for row in opened[0].sides for side in row]
-    both = 4 if len(opened) == 2 or any(piece.on_fold or piece.quantity % 2 == 0 for piece in sewn) else 2
-    title = find_unused_name("pocket_bag", {piece.name for piece in pattern.pieces[pattern.sample]})
-    seams = list(pattern.seams)
-    for number, seam in enumerate(seams):
-        if seam.name not in names:
-            continue
+    joined = [pattern.piece(side.piece, pattern.sample) for row in opened[0].sides for side in row]
+    both = 4 if len(opened) == 2 or any(piece.on_fold or piece.quantity % 2 == 0 for piece in joined) else 2
+    title = free_piece_name(pattern, "pocket_bag")
+    ends = [pocket.below, pocket.below + pocket.height]
+    for seam in opened:
+        first = seam.sides[0][0]
+        for piece in in_sizes(pattern, first.piece):
+            _check_end(ends[1], seam.name, piece.edge(first.edge).length)
         # Notches at both ends of the opening.
-        side, by_size = seam.sides[0][0], {}
-        for size in pattern.pieces:
-            points, with_seam = _downwards(pattern.piece(side.piece, size), side)
-            whole = float(arc_lengths(points)[-1])
-            stretch = np.array([pocket.below, pocket.below + pocket.height])
-            if stretch[1] > whole - _CLEAR:
-                raise InputError(
-                    f"the pocket ends {1e3 * stretch[1]:.0f} mm along {seam.name!r}, which is {1e3 * whole:.0f} mm long"
-                )
-            shares = stretch / whole if with_seam else 1.0 - stretch / whole
-            by_size[size] = with_notches(seam.of_size(size), shares.tolist(), whole)
-        seams[number] = replace(seam, notches=by_size[pattern.sample], size_notches=by_size)
-    pieces = {}
-    for size, row in pattern.pieces.items():
-        side = opened[0].sides[0][0]
-        piece = next(each for each in row if each.name == side.piece)
-        # A bag: its straight edge along the seam, its rim deeper below the opening than above.
-        points, _ = _downwards(piece, side)
+        pattern = with_notches(pattern, seam, dict.fromkeys(pattern.pieces, ends))
+    side = opened[0].sides[0][0]
+
+    def bag(piece: Piece) -> Piece:
+        # Its straight edge lies along the seam, its rim reaches deeper below the opening than above.
         start = max(0.0, pocket.below - _PAST)
-        edge = points_at_lengths(points, np.array([start, pocket.below + pocket.height + _PAST]))
-        length = float(np.linalg.norm(edge[1] - edge[0]))
-        deep = pocket.width
+        ends = points_at_lengths(downwards(piece, side.edge)[0], [start, pocket.below + pocket.height + _PAST])
+        length, deep = float(np.linalg.norm(ends[1] - ends[0])), pocket.width
         # In the frame of the bag the seam runs upwards along x = 0, the cloth lies to its left.
         turn = np.linspace(0.0, np.pi / 2, 9)
-        low = -0.35 * length
-        radius = min(0.4 * deep, 0.4 * length)
-        upper = np.array([-deep + radius, length - radius]) + radius * np.column_stack([-np.sin(turn), np.cos(turn)])
-        lower = np.array([-deep + radius, low + radius]) + radius * np.column_stack([-np.cos(turn), -np.sin(turn)])
+        round_end = np.column_stack([-np.sin(turn), np.cos(turn)])
+        low, radius = -0.35 * length, min(0.4 * deep, 0.4 * length)
+        upper = np.array([-deep + radius, length - radius]) + radius * round_end
+        lower = np.array([-deep + radius, low + radius]) + radius * round_end[::-1] * [1.0, -1.0]
         around = np.vstack([[0.0, length], upper, lower, [-0.02, low], [0.0, 0.0]])
         past = pocket.below - start
-        ends = {"pocket opening": length - past, "pocket opening end": length - past - pocket.height}
-        pieces[size] = (
-            *row,
-            Piece(
-                name=title,
-                size=piece.size,
-                fabric=piece.fabric,
-                quantity=both,
-                role="pocket",
-                edges=[
-                    Edge(name="opening", points=np.array([[0.0, 0.0], [0.0, length]]), kind="cut", allowance=0.010),
-                    Edge(name="rim", points=around),
-                ],
-                internal_lines={name: np.array([[-0.012, y], [0.0, y]]) for name, y in ends.items()},
-                grain=np.array([[-0.5 * deep, 0.1 * length], [-0.5 * deep, 0.7 * length]]),
-            ),
-        )
-    rim = SeamSide(piece=title, edge="rim")
-    words = find_unused_name("pocket bag", {seam.name for seam in seams})
-    seams.append(Seam(name=words, sides=((rim,), (replace(rim, mirrored=True),))))
-    return replace(pattern, pieces=pieces, seams=seams)
+        marked = {"pocket opening": length - past, "pocket opening end": length - past - pocket.height}
+        edges = [
+            Edge(name="opening", points=np.array([[0.0, 0.0], [0.0, length]]), kind="cut", allowance=NARROW),
+            Edge(name="rim", points=around),
+        ]
+        return _pocket_piece(
+            title, piece, edges, both, paired=True,
+            internal_lines={name: np.array([[-0.012, y], [0.0, y]]) for name, y in marked.items()},
+            grain=np.array([[-0.5 * deep, 0.1 * length], [-0.5 * deep, 0.7 * length]]),
+        )  # fmt: skip
 
-
-def _downwards(piece: Piece, side: SeamSide) -> tuple[FloatArray, bool]:
-    """Return the points of an edge from its upper end, and whether the seam runs that way."""
-    points = piece.edge(side.edge).points
-    grain = np.array([0.0, 1.0]) if piece.grain is None else piece.grain[1] - piece.grain[0]
-    down = bool((points[-1] - points[0]) @ grain < 0.0)
-    return (points if down else points[::-1]), down != side.reversed
+    pattern = with_pieces(pattern, map(bag, in_sizes(pattern, side.piece)))
+    return copies_sewn(pattern, "pocket bag", title, "rim")

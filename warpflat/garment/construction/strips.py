@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, arc_lengths, points_at_lengths, polyline_length
-from warpflat.pattern import Edge, drawn_length
+from warpflat.core import FloatArray, InputError, part_between, polyline_length
+from warpflat.garment.construction.edges import bezier
+from warpflat.pattern import Edge, Piece, drawn_length
 
-__all__ = ["CLOTH_WIDTH", "Strip", "panel_count", "strip_edges", "swept"]
+__all__ = ["CLOTH_WIDTH", "NARROW", "Strip", "folded_strip", "panel_count", "strip_edges", "swept"]
 
 #: Usable width of the cloth [m], if nobody says another one: what is left of a cloth of 1.45 m between its selvedges.
 CLOTH_WIDTH = 1.40
+
+#: Allowance of an edge that is turned in or overlocked, and of a narrow hem [m].
+NARROW = 0.010
 
 # A curved lower edge has so many points, an odd number: one lies in its middle.
 _POINTS = 97
@@ -92,8 +96,8 @@ def strip_edges(
     *,
     overlap: float = 0.0,
     rounded: float = 0.0,
-    kinds: Mapping[str, str] = MappingProxyType({}),
-    allowance: Mapping[str, float] = MappingProxyType({}),
+    kinds: Mapping[str, str] | str = "seam",
+    allowance: Mapping[str, float] | float | None = None,
 ) -> list[Edge]:
     """Return the edges of a strip: "lower", "overlap" where it has one, "right end", "upper" and "left end".
 
@@ -101,8 +105,8 @@ def strip_edges(
         lower, upper: #P by 2 [m], from left to right.
         overlap: how far a straight strip runs on beyond its right end [m].
         rounded: radius of the upper corners [m].
-        kinds: of edges by name; "seam" if not given.
-        allowance: of edges by name [m]; that of their kind if not given.
+        kinds: of all edges, or by name, "seam" if not given.
+        allowance: of all edges, or by name [m]; that of their kind if not given.
     """
     reach = np.array([overlap, 0.0])
     corner, upper = lower[-1] + reach, np.vstack([upper[:-1], upper[-1:] + reach])[::-1]
@@ -118,20 +122,54 @@ def strip_edges(
         "left end": left,
     }
     return [
-        Edge(name=name, points=points, kind=kinds.get(name, "seam"), allowance=allowance.get(name))
+        Edge(
+            name=name, points=points, kind=kinds if isinstance(kinds, str) else kinds.get(name, "seam"),
+            allowance=allowance.get(name) if isinstance(allowance, Mapping) else allowance,
+        )
         for name, points in lines.items()
         if name != "overlap" or overlap > 0.0
-    ]
+    ]  # fmt: skip
+
+
+def folded_strip(
+    name: str,
+    like: Piece,
+    length: float,
+    width: float,
+    *,
+    role: str,
+    quantity: int = 1,
+    allowance: Mapping[str, float] | float = NARROW,
+    grain: tuple[float, float] | None = None,
+    **other: Any,
+) -> Piece:
+    """Return a straight strip that is folded lengthwise, with cut edges.
+
+    Args:
+        name: of the piece.
+        like: a piece of its size and cloth.
+        length, width: finished [m].
+        role, quantity, allowance: of the piece and its edges.
+        grain: where its grain begins and how high it lies, as shares of the length and of the finished width.
+        other: more lines and marks.
+    """
+    fold = np.array([[0.0, width], [length, width]])
+    edges = strip_edges(*swept(Strip(length=length, height=2.0 * width)), kinds="cut", allowance=allowance)
+    lines = {"fold line": fold, **other.pop("internal_lines", {})}
+    if grain is not None:
+        other["grain"] = np.array([[grain[0], grain[1]], [1.0 - grain[0], grain[1]]]) * [length, width]
+    return Piece(
+        name=name, size=like.size, fabric=like.fabric, quantity=quantity, edges=edges, role=role, paired=False,
+        internal_lines=lines, **other,
+    )  # fmt: skip
 
 
 def _rounded(before: FloatArray, after: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
     """Return two lines that meet in a corner with that rounded; the round part goes to the line that is longer."""
     lengths = polyline_length(before), polyline_length(after)
     radius = min(radius, 0.9 * lengths[0], 0.9 * lengths[1])
-    start, end = points_at_lengths(before, [lengths[0] - radius])[0], points_at_lengths(after, [radius])[0]
-    at = np.linspace(0.0, 1.0, 13)[:, None]
-    curve = (1.0 - at) ** 2 * start + 2.0 * at * (1.0 - at) * before[-1] + at**2 * end
-    kept = before[arc_lengths(before) < lengths[0] - radius - 1e-9], after[arc_lengths(after) > radius + 1e-9]
+    kept = part_between(before, 0.0, lengths[0] - radius), part_between(after, radius, lengths[1])
+    curve = bezier(kept[0][-1], before[-1], kept[1][0], count=13)
     if lengths[0] > lengths[1]:
-        return np.vstack([kept[0], curve]), np.vstack([end, kept[1]])
-    return np.vstack([kept[0], start]), np.vstack([curve, kept[1]])
+        return np.vstack([kept[0][:-1], curve]), kept[1]
+    return kept[0], np.vstack([curve, kept[1][1:]])

@@ -12,7 +12,8 @@ import numpy as np
 from warpflat.core import IntArray
 from warpflat.garment.mannequin.bricks import TRUNK_LEVELS
 from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS
-from warpflat.pattern import GREY, SKIN, DrawnView, drawn_page, make_facets, view_from_side
+from warpflat.garment.mannequin.picture import body_views
+from warpflat.pattern import GREY, SKIN, draw_row, drawn_page
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.mannequin import Mannequin
@@ -124,22 +125,18 @@ def write_measurement_card(
         pen.write(0.5, 11.3, title, 15, fontweight="bold")
         pen.write(0.5, 11.03, "Measure over underwear, the tape snug and level, standing upright.", 9.5, color=GREY)
         number = {name: k for k, name in enumerate(needed, start=1)}
-        faces = mannequin.layout.body_faces
-        facets = make_facets(faces, np.empty((0, 2), dtype=np.int32))
-        for middle, degrees, names in (
-            (2.20, 0.0, [name for name in needed if name not in _BEHIND]),
-            (6.07, 180.0, [name for name in needed if name in _BEHIND]),
-        ):
-            view = view_from_side(mannequin.vertices, facets, degrees)
-            scale = _HEIGHT / float(view.size[1])
-            drawn = DrawnView(
-                pen,
-                view,
-                left=middle - 0.5 * float(view.size[0]) * scale,
-                bottom=_TOP - _HEIGHT,
-                inches_per_metre=scale,
-            )
-            drawn.draw(np.tile(SKIN, (len(faces), 1)))
+        views, shades = (
+            body_views(mannequin, (("", 0.0), (" ", 180.0))),
+            np.tile(SKIN, (len(mannequin.layout.body_faces), 1)),
+        )
+        wide, high = views[""].size[:2].tolist()
+        scale = _HEIGHT / high
+        gap = 0.5 * _PAGE[0] - wide * scale
+        bodies = draw_row(
+            pen, views, [shades] * 2, left=0.5 * gap, bottom=_TOP - _HEIGHT, inches_per_metre=scale, gap=gap
+        )
+        for drawn, is_behind in zip(bodies, (False, True), strict=True):
+            view, names = drawn.view, [name for name in needed if (name in _BEHIND) is is_behind]
             tapes = {
                 name: drawn.to_page(view.points[ids]) for name in names if (ids := _tape(mannequin, name)) is not None
             }

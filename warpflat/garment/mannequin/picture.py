@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from warpflat.pattern import (
     DrawnView,
     Pen,
     Scale,
+    View,
     draw_row,
     drawn_page,
     make_facets,
@@ -28,7 +30,7 @@ from warpflat.pattern import (
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.mannequin import Mannequin
 
-__all__ = ["signed_distances", "write_distance_picture", "write_mannequin_picture"]
+__all__ = ["body_views", "signed_distances", "write_distance_picture", "write_mannequin_picture"]
 
 _VIEWS = (("front", 0.0), ("three-quarter", 38.0), ("left side", 90.0), ("back", 180.0))
 _HEIGHT, _GAP = 8.0, 0.2  # of the page, and between views [in]
@@ -39,6 +41,12 @@ _FACING = 0.12
 _SCALE = 15.0
 
 
+def body_views(mannequin: Mannequin, sides: Iterable[tuple[str, float]]) -> dict[str, View]:
+    """Return views of a mannequin without its mesh by title, from some sides [degrees]."""
+    facets = make_facets(mannequin.layout.body_faces, np.empty((0, 2), dtype=np.int32))
+    return {title: view_from_side(mannequin.vertices, facets, degrees) for title, degrees in sides}
+
+
 def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) -> None:
     """Draw the mannequin from front, three-quarter, side and back, with profiles and lines by name and girth in cm.
 
@@ -46,15 +54,14 @@ def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) 
         InputError: if the file cannot be written.
     """
     faces = mannequin.layout.body_faces
-    facets = make_facets(faces, np.empty((0, 2), dtype=np.int32))
-    views = [(title, view_from_side(mannequin.vertices, facets, angle)) for title, angle in _VIEWS]
-    span = float(views[0][1].size[1])
+    views = body_views(mannequin, _VIEWS)
+    span = float(views["front"].size[1])
     # The side view keeps room for the profiles' names behind it.
-    widths = [0.62 * span if title == "left side" else 1.03 * float(view.size[0]) for title, view in views]
+    widths = [0.62 * span if title == "left side" else 1.03 * float(view.size[0]) for title, view in views.items()]
     scale = _HEIGHT * 0.92 / (1.06 * span)
     with drawn_page(path, sum(widths) * scale, _HEIGHT) as pen:
         left = 0.0
-        for (title, view), width in zip(views, widths, strict=True):
+        for (title, view), width in zip(views.items(), widths, strict=True):
             middle = left + (0.5 * width - (0.11 * span if title == "left side" else 0.0)) * scale
             left += width * scale
             corner = middle - 0.5 * float(view.size[0]) * scale
@@ -145,10 +152,9 @@ def write_distance_picture(mannequin: Mannequin, path: str | os.PathLike[str]) -
     Raises:
         InputError: if the file cannot be written.
     """
-    faces, distance = mannequin.layout.body_faces, 1000.0 * signed_distances(mannequin)
+    distance = 1000.0 * signed_distances(mannequin)
     scale, far = Scale(low=-_SCALE, high=_SCALE, colours="RdBu"), np.abs(distance)
-    facets = make_facets(faces, np.empty((0, 2), dtype=np.int32))
-    views = {title: view_from_side(mannequin.vertices, facets, angle) for title, angle in SIDES}
+    views = body_views(mannequin, SIDES)
     inches = _HEIGHT * 0.82 / float(views["front"].size[1])
     with drawn_page(path, inches * sum(float(view.size[0]) for view in views.values()) + 3 * _GAP, _HEIGHT) as pen:
         colours, left = [scale.rgb(distance)] * len(views), 0.5 * _GAP

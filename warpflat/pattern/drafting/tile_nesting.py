@@ -28,6 +28,8 @@ CELL = 0.008
 _MANY, _FEWEST = 150, 4
 # A shape becomes cells block by block of so many each way.
 _BLOCK = 6
+# Transforms of masks are kept in so much memory [B].
+_KEPT = 2**27
 #: Orders of the pieces that are tried.
 ORDERS = 8
 #: What one more row or column of the whole sheet counts as, in tiles: a long strip is hard to glue and to lay out.
@@ -322,7 +324,7 @@ def _touched(cells: BoolArray, row: int, column: int, grid: _Grid) -> BoolArray:
 
 
 class Places:
-    """The free places of masks on one sheet, by correlation with what is occupied; transforms are kept."""
+    """The free places of masks on one sheet, by correlation with what is occupied; transforms are kept, as far as memory allows."""
 
     def __init__(self, shape: tuple[int, int]) -> None:
         from scipy.fft import next_fast_len, rfft2
@@ -330,7 +332,7 @@ class Places:
         self.occupied = np.zeros(shape, dtype=bool)
         self._size = (next_fast_len(shape[0], real=True), next_fast_len(shape[1], real=True))
         self._transform = lambda cells: rfft2(cells.astype(np.float32), s=self._size)
-        self._masks: dict[int, Any] = {}
+        self._masks: dict[tuple[tuple[int, ...], bytes], Any] = {}
         self._here: Any = None
 
     def take(self, mask: Mask, row: int, column: int) -> None:
@@ -348,9 +350,14 @@ class Places:
             return np.ones((down, across), dtype=bool)
         if self._here is None:
             self._here = self._transform(self.occupied)
-        if id(mask) not in self._masks:
-            self._masks[id(mask)] = np.conj(self._transform(mask.cells))
-        meets = irfft2(self._here * self._masks[id(mask)], s=self._size)
+        # Equal pieces share one.
+        key = mask.cells.shape, mask.cells.tobytes()
+        transform = self._masks.get(key)
+        if transform is None:
+            transform = np.conj(self._transform(mask.cells))
+            if (len(self._masks) + 1) * transform.nbytes <= _KEPT:
+                self._masks[key] = transform
+        meets = irfft2(self._here * transform, s=self._size)
         return np.asarray(meets[:down, :across] < 0.5)
 
     def clear(self) -> None:

@@ -99,6 +99,11 @@ class Scale:
             shades = colormaps[self.colours](places)[:, :3] * _CLOTH
         return ScalarMappable(Normalize(self.low, self.high), ListedColormap(shades).with_extremes(bad=_NO_VALUE))
 
+    def css(self) -> str:
+        """Return the colours from end to end as the stops of a CSS gradient."""
+        shades = 255.0 * self.rgb(np.linspace(self.low, self.high, 17))
+        return ",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in shades)
+
     def rgb(self, values: FloatArray) -> FloatArray:
         """Return the sRGB colours (#N by 3, 0 to 1) of values (#N)."""
         if self.colours == ENERGY:

@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from warpflat.core import FloatArray, IntArray, launch_quietly, start_warp
 from warpflat.kernels.raster import put_nearest, shade_pixels
 
-__all__ = ["Lighting", "Samples", "rasterise", "shade"]
+__all__ = ["Samples", "rasterise", "shade"]
 
+#: Where light comes from: right, up, towards the viewer. The faces' reverse shows little of a map, since that belongs to the front.
+LIGHT, BACK = (-0.42, 0.55, 0.72), (0.80, 0.80, 0.79)
 _DEPTHS = 2**31 - 1  # steps of depth: what is left of 64 bits beside the sign and the triangle
 
 
@@ -67,24 +69,6 @@ def rasterise(points: FloatArray, triangles: IntArray, shape: tuple[int, int]) -
     return Samples(front=front, back=back, step=step)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Lighting:
-    """Light on the faces of a picture.
-
-    Attributes:
-        normals: of any length, towards the viewer where the face's front is seen; None for no light.
-        at_vertices: whether the normals are those of vertices (#V by 3), to be blended over triangles, or those of
-            triangles (#T by 3).
-        direction: where light comes from: right, up, towards the viewer; of any length.
-        back: colour of the faces' reverse, which shows little of the energy, since that belongs to the front.
-    """
-
-    normals: FloatArray | None = None
-    at_vertices: bool = True
-    direction: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    back: tuple[float, float, float] = (1.0, 1.0, 1.0)
-
-
 def shade(
     samples: Samples,
     per_pixel: int,
@@ -93,7 +77,8 @@ def shade(
     colours: FloatArray,
     *,
     face: IntArray,
-    lighting: Lighting | None = None,
+    normals: FloatArray | None = None,
+    at_vertices: bool = True,
 ) -> NDArray[np.uint8]:
     """Return RGBA pixels (#R by #C by 4): the mean colour of their samples, and the covered share as opacity.
 
@@ -105,13 +90,13 @@ def shade(
         points, triangles: as they were rasterised.
         colours: #F by 3, sRGB.
         face: #T, the face of each triangle.
-        lighting: None for no light.
+        normals: of any length, towards the viewer where the face's front is seen; None for no light.
+        at_vertices: whether the normals are those of vertices (#V by 3), to be blended over triangles, or those of triangles (#T by 3).
     """
-    lighting = lighting or Lighting()
     rows, columns = (size // per_pixel for size in samples.front.shape)
     pixels = np.zeros((rows, columns, 4), dtype=np.uint8)
-    normals = np.zeros((1, 3)) if lighting.normals is None else lighting.normals
-    direction = np.asarray(lighting.direction) / np.linalg.norm(lighting.direction)
+    directions = np.zeros((1, 3)) if normals is None else normals
+    light = np.asarray(LIGHT) / np.linalg.norm(LIGHT)
     inputs = [
         _shared(samples.triangle, wp.int32),
         per_pixel,
@@ -119,11 +104,11 @@ def shade(
         _shared(triangles, wp.vec3i),
         _shared(face, wp.int32),
         _shared(colours.astype(np.float32), wp.vec3f),
-        _shared(normals.astype(np.float32), wp.vec3f),
-        lighting.normals is not None,
-        lighting.at_vertices,
-        wp.vec3f(*direction),
-        wp.vec3f(*lighting.back),
+        _shared(directions.astype(np.float32), wp.vec3f),
+        normals is not None,
+        at_vertices,
+        wp.vec3f(*light),
+        wp.vec3f(*BACK),
     ]
     launch_quietly(shade_pixels, dim=(rows, columns), inputs=inputs, outputs=[_shared(pixels, wp.vec4ub)], device="cpu")
     return pixels

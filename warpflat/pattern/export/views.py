@@ -14,7 +14,7 @@ from warpflat.core import BoolArray, FloatArray, IntArray
 from warpflat.flat import Surface, area_vectors, mean_normals, triangulate
 from warpflat.pattern.export.figure import GREY, INK, Pen, Pixels
 from warpflat.pattern.export.geometry import outline_edges
-from warpflat.pattern.export.raster import Lighting, Samples, rasterise, shade
+from warpflat.pattern.export.raster import Samples, rasterise, shade
 
 __all__ = [
     "PIXELS_AROUND",
@@ -36,8 +36,6 @@ SIDES = (("front", 0.0), ("left side", 90.0), ("back", 180.0))
 _FINE = 500_000  # triangles, about as many as pixels
 PIXELS_AROUND = 3  # the image of a mesh
 _COARSE = 120  # pixels across a view, enough to tell its area
-_LIGHT = (-0.42, 0.55, 0.72)  # where it comes from: right, up, towards the viewer
-_BACK = (0.80, 0.80, 0.79)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -195,9 +193,10 @@ class Shot:
         # Of a fine mesh each triangle has a normal, else each vertex.
         if normals is not None and not self._fine:
             normals = mean_normals(normals, facets.triangles, len(self.view.points))
-        lighting = Lighting(normals=normals, at_vertices=not self._fine, direction=_LIGHT, back=_BACK)
-        face, triangles = facets.face_of_triangle, facets.triangles
-        return shade(self.samples, self._per_pixel, self.grid, triangles, face_colours, face=face, lighting=lighting)
+        return shade(
+            self.samples, self._per_pixel, self.grid, facets.triangles, face_colours,
+            face=facets.face_of_triangle, normals=normals, at_vertices=not self._fine,
+        )  # fmt: skip
 
     @property
     def covered(self) -> float:

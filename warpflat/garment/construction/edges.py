@@ -1,0 +1,203 @@
+"""An algebra of edges, in which the parts that finish a garment are said.
+
+Lines are points, #P by 2 [m]: mirrored, rounded, parted. Pieces take the place of others, or are new, in
+every size at once. Seams get the first name that is free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from warpflat.core import FloatArray, find_unused_name, part_between
+from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
+
+__all__ = [
+    "ON",
+    "ON_EDGE",
+    "Place",
+    "backwards",
+    "beside",
+    "bezier",
+    "copies_sewn",
+    "direction",
+    "downwards",
+    "free_piece_name",
+    "in_sizes",
+    "lines_inside",
+    "mirrored",
+    "neighbour",
+    "parted",
+    "polygon_edges",
+    "runs_down",
+    "sewn",
+    "sewn_places",
+    "side_points",
+    "trimmed",
+    "up_and_across",
+    "with_edges",
+    "with_pieces",
+]
+
+#: An edge of a pattern: its piece and its name.
+Place = tuple[str, str]
+Sides = SeamSide | tuple[SeamSide, ...]
+
+#: What lies on a line or an outline does so within this distance [m]; a line of a piece ends on an edge within the second.
+ON, ON_EDGE = 1e-6, 1e-3
+# A line that is shorter inside an outline is left out [m].
+_SHORT = 1e-3
+
+
+def direction(points: FloatArray) -> FloatArray:
+    """Return the unit vector from the first point of a line to its last."""
+    return np.asarray((points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0]))
+
+
+def mirrored(points: FloatArray, at: FloatArray, out: FloatArray) -> FloatArray:
+    """Return the mirror image of points at the line through `at` whose unit normal is `out`."""
+    return np.asarray(points + 2.0 * np.outer((at - points) @ out, out))
+
+
+def bezier(*controls: FloatArray, count: int) -> FloatArray:
+    """Return points along a Bezier curve (`count` by 2 [m]), by de Casteljau's construction."""
+    at = np.linspace(0.0, 1.0, count)[:, None]
+    rows = list(controls)
+    while len(rows) > 1:
+        rows = [(1.0 - at) * one + at * other for one, other in pairwise(rows)]
+    return np.asarray(rows[0])
+
+
+def lines_inside(lines: Mapping[str, FloatArray], outline: FloatArray) -> dict[str, FloatArray]:
+    """Return of each line the longest part that lies inside an outline; lines with less than 1 mm inside are left out."""
+    import shapely
+
+    body, found = shapely.Polygon(outline).buffer(ON), {}
+    for name, line in lines.items():
+        parts = shapely.get_parts(shapely.LineString(line).intersection(body))
+        parts = [part for part in parts if part.geom_type == "LineString" and part.length > _SHORT]
+        if parts:
+            found[name] = np.asarray(max(parts, key=lambda part: part.length).coords)
+    return found
+
+
+def up_and_across(piece: Piece) -> tuple[FloatArray, FloatArray]:
+    """Return the unit vectors along the warp, upwards, and along the weft, to the right."""
+    up = np.array([0.0, 1.0]) if piece.grain is None else direction(piece.grain)
+    return up, np.array([up[1], -up[0]])
+
+
+def runs_down(piece: Piece, points: FloatArray) -> bool:
+    """Return whether a line of a piece runs against the grain."""
+    return bool((points[-1] - points[0]) @ up_and_across(piece)[0] < 0.0)
+
+
+def downwards(piece: Piece, name: str) -> tuple[FloatArray, bool]:
+    """Return the points of an edge from its upper end, and whether it runs that way itself."""
+    points = piece.edge(name).points
+    down = runs_down(piece, points)
+    return points[:: 1 if down else -1], down
+
+
+def side_points(pattern: Pattern, side: SeamSide, size: str) -> FloatArray:
+    """Return the points of a seam's side, as the seam runs."""
+    return pattern.piece(side.piece, size).edge(side.edge).points[:: -1 if side.reversed else 1]
+
+
+def neighbour(piece: Piece, edge: str, end: int) -> tuple[str, int]:
+    """Return the edge that meets another one at its end (0 or 1), and which end of that it is."""
+    names = [each.name for each in piece.edges]
+    at = names.index(edge)
+    return (names[(at + 1) % len(names)], 0) if end == 1 else (names[at - 1], 1)
+
+
+def beside(piece: Piece, *chain: str) -> tuple[str, str]:
+    """Return the names of the edges before and after some that follow each other."""
+    return neighbour(piece, chain[0], 0)[0], neighbour(piece, chain[-1], 1)[0]
+
+
+def polygon_edges(names: Sequence[str], corners: FloatArray, **how: Any) -> list[Edge]:
+    """Return straight edges from corner to corner (#N by 2 [m], counter-clockwise), with other attributes, if given."""
+    ends = zip(corners, np.roll(corners, -1, axis=0), strict=True)
+    return [Edge(name=name, points=np.array(both), **how) for name, both in zip(names, ends, strict=True)]
+
+
+def backwards(edges: Sequence[Edge]) -> list[Edge]:
+    """Return edges that follow each other as they are walked the other way."""
+    rows = [(edge, None if edge.vertices is None else edge.vertices[::-1]) for edge in edges[::-1]]
+    return [replace(edge, points=edge.points[::-1], vertices=vertices) for edge, vertices in rows]
+
+
+def with_edges(piece: Piece, new: Mapping[str, Sequence[Edge]], **other: Any) -> Piece:
+    """Return a piece with others in place of some edges, by name, and with other attributes, if given."""
+    return replace(piece, edges=[each for edge in piece.edges for each in new.get(edge.name, (edge,))], **other)
+
+
+def parted(edge: Edge, at: float, names: tuple[str, str]) -> tuple[Edge, Edge]:
+    """Return the two parts of an edge that ends and begins at a length along it [m]."""
+    first, second = part_between(edge.points, 0.0, at), part_between(edge.points, at, edge.length)
+    # Corners are shared bit for bit.
+    first[0], second[-1], second[0] = edge.points[0], edge.points[-1], first[-1]
+    return (
+        replace(edge, name=names[0], points=first, vertices=None),
+        replace(edge, name=names[1], points=second, vertices=None),
+    )
+
+
+def trimmed(piece: Piece, edges: Sequence[Edge], **other: Any) -> Piece:
+    """Return a piece with a smaller outline, and with what of its lines and marks lies inside."""
+    import shapely
+
+    outline = np.concatenate([edge.points[:-1] for edge in edges])
+    body = shapely.Polygon(outline).buffer(ON)
+    return replace(
+        piece, edges=edges, internal_lines=lines_inside(piece.internal_lines, outline),
+        marks={name: mark for name, mark in piece.marks.items() if body.contains(shapely.Point(mark))}, **other,
+    )  # fmt: skip
+
+
+def in_sizes(pattern: Pattern, name: str) -> list[Piece]:
+    """Return the piece of a name in every size."""
+    return [pattern.piece(name, size) for size in pattern.pieces]
+
+
+def with_pieces(pattern: Pattern, pieces: Iterable[Piece]) -> Pattern:
+    """Return a pattern with pieces in place of those of their names and sizes, and with those that are new."""
+    rows = {size: {piece.name: piece for piece in row} for size, row in pattern.pieces.items()}
+    for piece in pieces:
+        rows[piece.size][piece.name] = piece
+    return replace(pattern, pieces={size: tuple(row.values()) for size, row in rows.items()})
+
+
+def free_piece_name(pattern: Pattern, name: str) -> str:
+    """Return the name of a new piece: the one that is asked for, or the first one after it that is free."""
+    return find_unused_name(name, {piece.name for piece in pattern.pieces[pattern.sample]})
+
+
+def sewn(pattern: Pattern, name: str, first: Sides, second: Sides, **how: Any) -> Pattern:
+    """Return a pattern with one more seam, of that name or the first one after it that is free.
+
+    Args:
+        pattern: with its pieces.
+        name: what the seam is to be called.
+        first, second: its sides.
+        how: other attributes of a :class:`Seam`.
+    """
+    rows = [(row,) if isinstance(row, SeamSide) else row for row in (first, second)]
+    name = find_unused_name(name, {seam.name for seam in pattern.seams})
+    return replace(pattern, seams=[*pattern.seams, Seam(name=name, sides=(rows[0], rows[1]), **how)])
+
+
+def copies_sewn(pattern: Pattern, name: str, piece: str, *edges: str) -> Pattern:
+    """Return a pattern with edges of a piece sewn to those of its copy that is turned over."""
+    row = tuple(SeamSide(piece=piece, edge=edge) for edge in edges)
+    return sewn(pattern, name, row, tuple(replace(side, mirrored=True) for side in row))
+
+
+def sewn_places(pattern: Pattern) -> set[Place]:
+    """Return the edges that seams join."""
+    return {(side.piece, side.edge) for seam in pattern.seams for row in seam.sides for side in row}
