@@ -3,6 +3,8 @@
 from .cutting.candidates import Peaks as Peaks
 from .cutting.candidates import find_candidates as find_candidates
 from .cutting.candidates import find_peaks as find_peaks
+from .cutting.crack import ElasticCrack as ElasticCrack
+from .cutting.crack import LaidCloth as LaidCloth
 from .cutting.cut_piece import cut as cut
 from .cutting.cut_plan import CutPlan as CutPlan
 from .cutting.cut_plan import draw_line as draw_line

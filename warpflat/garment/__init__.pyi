@@ -127,7 +127,6 @@ from .mannequin.table import MannequinTable as MannequinTable
 from .mannequin.table import mannequin_from_table as mannequin_from_table
 from .mannequin.usd import write_mannequin_usd as write_mannequin_usd
 from .seams.cloth import Cloth as Cloth
-from .seams.energy import laid_flat as laid_flat
 from .seams.find import GRAIN as GRAIN
 from .seams.find import FoundSeams as FoundSeams
 from .seams.find import find_seams as find_seams
@@ -135,6 +134,7 @@ from .seams.find import seam_words as seam_words
 from .seams.layers import GarmentFile as GarmentFile
 from .seams.layers import read_garment as read_garment
 from .seams.layers import read_layers as read_layers
+from .seams.measure import laid_flat as laid_flat
 from .seams.options import SeamCut as SeamCut
 from .seams.options import SeamOptions as SeamOptions
 from .seams.solid import is_panel as is_panel

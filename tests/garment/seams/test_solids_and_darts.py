@@ -19,9 +19,11 @@ from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.tubes import tube_borders
 from warpflat.garment.construction.to_pattern import pattern_of_garment
 from warpflat.garment.seams.cloth import Cloth, PieceMesh
-from warpflat.garment.seams.energy import _TRIAL, _can_be_sewn, _Candidate, _cut, _Measured, laid_flat
+from warpflat.garment.seams.energy import _TRIAL, _can_be_sewn, _cut
 from warpflat.garment.seams.fields import Operators
 from warpflat.garment.seams.find import FoundSeams, cloth_of
+from warpflat.garment.seams.lines import Line
+from warpflat.garment.seams.measure import Measured, laid_flat
 from warpflat.garment.seams.solid import _limbs as limbs_of
 from warpflat.garment.seams.solid import part_solids
 
@@ -277,20 +279,20 @@ def test_a_dart_that_all_but_parts_a_piece_is_not_made(leaves: float, fits: bool
         vertices=np.stack([x, y, z], axis=2).reshape(-1, 3), faces=np.vstack([quads[:, :3], quads[:, [0, 2, 3]]])
     )
     start, end = np.array([0.001, 0.0, 0.0]), np.array([0.001, 0.14 - leaves, 0.0])
-    dart = _Candidate(name="dart", normal=np.array([1.0, 0.0, 0.0]), point=start, start=start, end=end)
+    dart = Line(name="dart", normal=np.array([1.0, 0.0, 0.0]), point=start, start=start, end=end)
     (whole,) = strip.pieces()
     made = _cut(strip, whole, dart, _TRIAL)
     assert made is not None
     before, after = (laid_on_trial(cloth) for cloth in (strip, made))
-    assert _can_be_sewn(made, dart, before, [after], size=0.5) == fits
+    assert _can_be_sewn(made, dart, [before], [after], size=0.5) == fits
 
 
-def laid_on_trial(cloth: Cloth) -> _Measured:
+def laid_on_trial(cloth: Cloth) -> Measured:
     """Return the only piece of a cloth, laid flat."""
     (mesh,) = cloth.pieces()
     surface = as_surface(cloth, mesh)
     result = warpflat.flatten(surface, fabric="woven")
-    return _Measured(
+    return Measured(
         mesh=mesh, surface=surface, result=result, outside=0.0, energy=0.0, area=1.0, place=mesh.vertices.mean(axis=0)
     )
 

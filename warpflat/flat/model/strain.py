@@ -15,18 +15,22 @@ import warp as wp
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
 from warpflat.flat.fabric.fabric import Fabric, grain_axes
+from warpflat.flat.fabric.limits import Demand
 from warpflat.flat.model.membrane import Model, make_cloth
 from warpflat.flat.model.network import SpringNetwork
 from warpflat.flat.surface.half_edges import half_edges_of
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.triangles import corner_triangles
 from warpflat.flat.surface.untangle import signed_cell_areas
+from warpflat.kernels.cells import Cells
 from warpflat.kernels.membrane_cell import Cloth
 from warpflat.kernels.strain import average_over_faces, compute_worn_strain
 
 __all__ = [
     "LayoutErrors",
     "WornStrain",
+    "area_beyond",
+    "corner_strain",
     "face_areas",
     "layout_errors",
     "shear_angles",
@@ -90,6 +94,11 @@ def shear_angles(strain: FloatArray) -> FloatArray:
     return np.asarray(np.degrees(np.arcsin(np.clip(strain[:, 2] / lengths, -1.0, 1.0))))
 
 
+def area_beyond(fabric: Fabric, strain: FloatArray, area: FloatArray) -> float:
+    """Return how much cloth with worn strains (#C by 3, see `WornStrain`) and areas (#C [m2]) is beyond its limits [m2]."""
+    return float(area[Demand.of(fabric, strain[:, 0], strain[:, 1], shear_angles(strain)).beyond].sum())
+
+
 def strain_energy(network: SpringNetwork, positions: FloatArray) -> float:
     """Return the strain energy of a layout (#V by 2 [m]), the sum of the faces' energies of `worn_strain` [J]."""
     return float(worn_cell_strain(network, positions, network.model)[2].numpy().sum())
@@ -107,6 +116,26 @@ def worn_cell_strain(network: SpringNetwork, positions: FloatArray, law: Model) 
     cloth = _cloth(network.fabric, network.grain_angle, device.alias, law)
     launch_each(compute_worn_strain, network.face_count, [at, network.cells, cloth], cells, device=device)
     return cells
+
+
+def corner_strain(network: SpringNetwork, places: FloatArray) -> FloatArray:
+    """Return the worn strain of cells whose corners lie apart from their neighbours', #C by 3 (see `WornStrain`).
+
+    Args:
+        network: of the piece.
+        places: #C by 3 by 2, of each cell's corners [m].
+    """
+    device, count = network.device, network.cell_count
+    apart = np.full((count, 4), -1, dtype=np.int32)
+    apart[:, :3] = np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
+    cells = Cells()
+    cells.face, cells.laid = wp.array(apart, dtype=wp.vec4i, device=device), network.cells.laid
+    cells.first = wp.array(np.arange(count, dtype=np.int32), dtype=wp.int32, device=device)
+    at = wp.array(np.ascontiguousarray(places.reshape(-1, 2)), dtype=wp.vec2d, device=device)
+    made = _worn_arrays(count, device)
+    cloth = _cloth(network.fabric, network.grain_angle, device.alias, "membrane")
+    launch_each(compute_worn_strain, count, [at, cells, cloth], made, device=device)
+    return np.array(made[0].numpy())
 
 
 @lru_cache

@@ -31,6 +31,7 @@ from warpflat.flat.solver.collapse import iterate_coarsenings
 from warpflat.flat.solver.grain import GrainAlignment
 from warpflat.flat.surface.laplacian import factor_pays, held_laplacian, laplacian_solver
 from warpflat.flat.surface.mesh import Surface, once_per_surface
+from warpflat.kernels.cells import CellForces
 from warpflat.kernels.constraints import LENGTHS, LINEAR, STRAIGHT
 from warpflat.kernels.membrane import differentiate_membrane
 
@@ -40,6 +41,8 @@ __all__ = [
     "Metric",
     "Solve",
     "StiffnessFactor",
+    "cell_forces",
+    "cell_stiffness",
     "equation_rows",
     "laplacian_solution",
     "stiffness_matrix",
@@ -269,22 +272,51 @@ def stiffness_matrix(network: SpringNetwork, positions: FloatArray) -> csc_array
 
 def _membrane_stiffness(network: SpringNetwork, positions: FloatArray, part: CellModel, cells: slice) -> csc_array:
     """Return the stiffness of the cells of a part that is a membrane: of each the second derivative, without what is negative."""
-    device, size, count = network.device, 2 * network.vertex_count, network.cell_count
-    second, inverse = wp.zeros(count, wp.mat44d, device), wp.zeros(count, wp.mat22d, device)
-    at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
-    given, made = [at, network.cells, part.parameters], [second, inverse]
-    record(differentiate_membrane, dim=part.count, first=part.first, inputs=given, outputs=made, device=device).launch()
-    values, vectors = np.linalg.eigh(second.numpy()[cells])
-    positive = (vectors * np.maximum(values, 0.0)[:, None, :]) @ vectors.transpose(0, 2, 1)
-    # Rows: the gradients of the barycentric weights of a cell's corners.
-    gradient = inverse.numpy()[cells]
-    gradient = np.concatenate([-gradient.sum(axis=1, keepdims=True), gradient], axis=1)
-    entries = np.einsum("cipjq,ckp,clq->ckilj", positive.reshape(-1, 2, 2, 2, 2), gradient, gradient, optimize=True)
+    size, entries = 2 * network.vertex_count, cell_stiffness(network, positions, part)[cells]
     place = 2 * network.cell_arrays.corner[cells][:, :, None] + np.arange(2, dtype=np.int32)
     rows, columns = (
         np.broadcast_to(each, entries.shape) for each in (place[:, :, :, None, None], place[:, None, None])
     )
     return csc_array(coo_array((entries.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)))
+
+
+def cell_stiffness(network: SpringNetwork, positions: FloatArray, part: CellModel) -> FloatArray:
+    """Return the stiffness of each cell of a part that is a membrane by the places of its corners, without what is negative.
+
+    Args:
+        network: of the piece.
+        positions: #V by 2, its layout [m].
+        part: of the network's cells; those of others have none.
+
+    Returns:
+        #C by 3 by 2 by 3 by 2: corner and coordinate, twice [N/m].
+    """
+    device, count = network.device, network.cell_count
+    second, inverse = wp.zeros(count, wp.mat44d, device), wp.zeros(count, wp.mat22d, device)
+    at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
+    given, made = [at, network.cells, part.parameters], [second, inverse]
+    record(differentiate_membrane, dim=part.count, first=part.first, inputs=given, outputs=made, device=device).launch()
+    values, vectors = np.linalg.eigh(second.numpy())
+    positive = (vectors * np.maximum(values, 0.0)[:, None, :]) @ vectors.transpose(0, 2, 1)
+    # Rows: the gradients of the barycentric weights of a cell's corners.
+    gradient = inverse.numpy()
+    gradient = np.concatenate([-gradient.sum(axis=1, keepdims=True), gradient], axis=1)
+    found = np.einsum("cipjq,ckp,clq->ckilj", positive.reshape(-1, 2, 2, 2, 2), gradient, gradient, optimize=True)
+    return np.asarray(found, dtype=np.float64)
+
+
+def cell_forces(network: SpringNetwork, positions: FloatArray, part: CellModel) -> FloatArray:
+    """Return the forces with which the cells of a part that is a membrane pull at the corners of their faces in a layout (#V by 2 [m]).
+
+    Returns:
+        #F by 4 by 2 [N]; a triangle's fourth corner is not used.
+    """
+    device, count, forces = network.device, network.face_count, CellForces()
+    forces.acting, forces.force = wp.zeros(count, wp.int8, device), wp.zeros(4 * count, wp.vec2d, device)
+    at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
+    given, made = [at, network.cells, part.parameters], [wp.zeros(count, wp.float64, device), forces]
+    record(part.potential, dim=part.count, first=part.first, inputs=given, outputs=made, device=device).launch()
+    return np.array(forces.force.numpy()).reshape(count, 4, 2)
 
 
 def _rows(count: int, vertices: IntArray, gradient: FloatArray) -> csr_array:

@@ -24,8 +24,9 @@ from warpflat.flat import (
 from warpflat.garment.seams.anatomy import HOLE, ROLES, Anatomy, averaged_limbs, axis_name, describe, find_anatomy
 from warpflat.garment.seams.by_hand import HAND, cut_by_hand, join_ends, keep_seams, leave_to_hand
 from warpflat.garment.seams.cloth import Cloth, PieceMesh
-from warpflat.garment.seams.energy import Trial, cut_by_energy, laid_flat
+from warpflat.garment.seams.energy import Trial, cut_by_energy
 from warpflat.garment.seams.fields import Operators
+from warpflat.garment.seams.measure import laid_flat
 from warpflat.garment.seams.openings import open_tubes
 from warpflat.garment.seams.options import SeamOptions
 from warpflat.garment.seams.solid import is_panel, part_solids
