@@ -38,7 +38,9 @@ def main(file: str) -> None:
             for number, body in enumerate(BODIES):
                 carried = job.to(body, {})
                 wearer = Body(vertices=carried.skin, faces=finer_body()[1])
-                points, facets, count = dress(wearer, carried.vertices, faces.astype(np.int32))
+                # The form has vertices beyond the shirt.
+                room = carried.vertices[np.unique(faces[faces >= 0])]
+                points, facets, count = dress(wearer, carried.vertices, faces.astype(np.int32), room)
                 view = view_from_side(points, facets, 0.0)
                 view.points[: len(carried.vertices), 2] += NEARER
                 shades = np.concatenate([np.tile(CLOTH, (len(faces), 1)), np.tile(SKIN, (count, 1))])

@@ -131,14 +131,9 @@ def fit(
             raise InputError(
                 f"--cut-seam {quote_value(text)}: what is carried is drawn by points:, line:X,Y,Z ... or plane:"
             )
-    options |= {
-        "cut_seam": tuple(cuts),
-        "fabric_file": options["fabric_files"],
-        "units": None,
-        "prim": None,
-        "name": None,
-    }
-    tables = scene_tables(options)
+    # The carried mesh is one of its own, with its unit.
+    of_file = dict.fromkeys(("units", "prim", "name"))
+    tables = scene_tables({**options, **of_file, "cut_seam": tuple(cuts), "fabric_file": options["fabric_files"]})
     tables["output"] = {"picture": not options["no_picture"], **tables.get("output", {})}
     check_tables(tables, garment, options["cut_seams"])
     require_own_study(folder)

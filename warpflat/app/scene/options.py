@@ -59,9 +59,10 @@ def errors_of_options(mesh: Path, drawn: Sequence[str] = ()) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        about, colon, text = str(error).partition(f"{COMMAND_LINE}: ")
-        if about or not colon:
-            raise
+        text = re.sub(r'component = "(largest|all)"', r"--component \1", str(error))
+        if not text.startswith(f"{COMMAND_LINE}: "):
+            raise type(error)(text) from None
+        text = text.removeprefix(f"{COMMAND_LINE}: ")
         found = _KEY.fullmatch(text)
         key = "" if found is None else found["key"].replace(": ", ".")
         # Options of the relaxation are named without their table.
@@ -75,5 +76,6 @@ def errors_of_options(mesh: Path, drawn: Sequence[str] = ()) -> Iterator[None]:
                 else ""
             )
             text = f"{_OPTIONS[key]}{given}{found['rest']}"
-        text = re.sub(r'component = "(largest|all)"', r"--component \1", text)
+        else:
+            text = str(error)
         raise type(error)(text) from None
