@@ -111,7 +111,7 @@ def test_pick_cut_cloth_undo_save(tmp_path: Path) -> None:
             assert browser.faults == []
             hosts = {urlsplit(url).hostname for url in browser.requests} - {None}
             assert hosts == {"127.0.0.1"}
-            assert shows_the_scale(browser, page, client)
+            wait_for(lambda: shows_the_scale(browser, page, client))
     finally:
         page.close()
 
@@ -205,7 +205,7 @@ def shows_the_scale(browser, page, client) -> bool:
     data = base64.b64decode(browser.send("Page.captureScreenshot", format="png")["data"])
     pixels = np.asarray(Image.open(io.BytesIO(data)).convert("RGB"), dtype=float)
     canvas = pixels[:, : browser.run("document.querySelector('canvas').clientWidth")]
-    expected = 255.0 * page.scale.colours(np.linspace(page.scale.low, page.scale.high, 64))
+    expected = 255.0 * page.scale.rgb(np.linspace(page.scale.low, page.scale.high, 64))
     right = canvas[:, canvas.shape[1] // 2 :].reshape(-1, 3)
     seen = right[np.abs(right - 255.0).max(axis=1) > 3.0]
     near = np.abs(seen[:, None] - expected).max(axis=2).min(axis=1) < 6.0

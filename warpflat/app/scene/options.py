@@ -28,7 +28,8 @@ _KEYS = {
 _OPTIONS = {key: "--" + option.replace("_", "-") for option, key in _KEYS.items()}
 # A scene's key at the beginning of a message, with its number in a list.
 _KEY = re.compile(
-    r"(?P<key>[a-z_]+(?:\.[a-z_]+|: [a-z_]+(?= = ))*)(?:\[(?P<number>\d+)\])?(?P<rest>(?:: | = | ').*)", re.DOTALL
+    r"(?P<key>[a-z_]+(?:\.[a-z_]+|: [a-z_]+(?= = ))*)(?:\[(?P<number>\d+)\](?:\.[a-z_]+)*)?(?P<rest>(?:: | = | ').*)",
+    re.DOTALL,
 )
 
 
