@@ -17,6 +17,6 @@ def test_an_armhole_is_as_long_as_it_was_drafted(form: str, fabric: str):
     girths = pattern_girths(body, garment.form, garment.positions)
     for side in ("left", "right"):
         armhole = girths[f"armhole {side}"]
-        assert -0.015 < armhole["pattern_m"] / armhole["form_m"] - 1.0 < 0.002
+        assert armhole["pattern_m"] == pytest.approx(armhole["form_m"], abs=1e-3)
         assert armhole["body_m"] == pytest.approx(polyline_length(body.line(f"armhole {side}")), abs=1e-9)
     assert girths["neck"]["pattern_m"] == pytest.approx(girths["neck"]["form_m"], rel=0.03)

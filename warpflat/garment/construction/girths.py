@@ -27,10 +27,10 @@ __all__ = ["girth_constraints", "pattern_girths"]
 
 
 def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]) -> list[KeptGirth]:
-    """Return constraints that give every level the ease that a form asks for, and armholes at most their drafted length.
+    """Return constraints that give every level the ease that a form asks for, and armholes with sleeves their length.
 
     Cloth at rest loses some of the ease to strain, or has more elsewhere. An armhole gives way to the longer cap that is
-    eased into it, and to the ease that is kept below it.
+    eased into it.
 
     Args:
         mannequin: the body.
@@ -38,6 +38,7 @@ def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping
         positions: by piece, #V by 2, at rest without these constraints [m].
     """
     layout, piece_edges = mannequin.layout, PieceEdges(mannequin.layout, form)
+    sleeves = np.concatenate([np.empty(0), *(form.pieces[cap].grid_vertices for cap in _caps(layout, form))])
     limbs = {name: (row, axis) for (name, _), row, _, axis in body_rows(mannequin)}
     lines = _lines(layout, form)
     found = []
@@ -45,10 +46,9 @@ def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping
         if "ease_wanted_m" in girth:
             edges = piece_edges.along(*([_row(layout, level)] if level in RING_LEVELS else limbs[level]))
             factor = (girth["body_m"] + girth["ease_wanted_m"]) / girth["pattern_m"]
-        elif level in lines and level != "neck":
+        elif level in lines and np.isin(lines[level][0], sleeves).all():
             edges = lines[level][1]
-            # What is cut to be worn stretched is shorter.
-            factor = min(1.0, girth["form_m"] / girth["pattern_m"])
+            factor = girth["form_m"] / girth["pattern_m"]
         else:
             continue
         assert edges is not None
