@@ -1,12 +1,12 @@
-"""Rows of vectors: unit ones, and points that are laid upon others."""
+"""Rows of vectors: unit and turned ones, and points that are laid upon others."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["laid_upon", "unit"]
+__all__ = ["laid_upon", "turned_left", "unit"]
 
 # A vector shorter than this has no direction, and stays as short.
 _SHORTEST = 1e-300
@@ -17,7 +17,12 @@ def unit(vectors: FloatArray) -> FloatArray:
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), _SHORTEST))
 
 
-def laid_upon(target: FloatArray, points: FloatArray, rows: slice | FloatArray = slice(None)) -> FloatArray:
+def turned_left(vectors: FloatArray) -> FloatArray:
+    """Return vectors (#N by 2) turned to the left by a right angle."""
+    return np.stack([-vectors[:, 1], vectors[:, 0]], axis=1)
+
+
+def laid_upon(target: FloatArray, points: FloatArray, rows: slice | BoolArray | IntArray = slice(None)) -> FloatArray:
     """Return points turned and shifted, not mirrored, to lie as near to their targets as they can.
 
     Source: Kabsch, "A solution for the best rotation to relate two sets of vectors", 1976.

@@ -27,6 +27,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import arc_lengths
+from warpflat.core.vectors import turned_left, unit
 from warpflat.flat.model.network import SpringNetwork
 from warpflat.flat.model.strain import area_beyond, corner_strain, worn_cell_strain
 from warpflat.flat.solver.metric import StiffnessFactor, cell_forces, cell_stiffness
@@ -186,7 +187,7 @@ class ElasticCrack:
             # The modes of a row: what lies before the end of a link turns with it, by one radian; and both shifts.
             moves = np.zeros((len(row), len(at) + 1, 2))
             for k, (i, j) in enumerate(pairwise(at)):
-                moves[: j + 1, k] = _turned(points[np.maximum(np.arange(j + 1), i)] - points[j])
+                moves[: j + 1, k] = turned_left(points[np.maximum(np.arange(j + 1), i)] - points[j])
             moves[:, -2:] = np.eye(2)
             corner, place = cloth.sides(row)
             first, last = begin[-1], begin[-1] + moves.shape[1]
@@ -231,7 +232,7 @@ class ElasticCrack:
             own = turned[self._begin[number] : self._begin[number + 1]]
             points = self.cloth.positions[self.rows[number][self.nodes[number]]]
             along = np.gradient(points, axis=0)
-            across = -_turned(along / np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None])
+            across = -turned_left(unit(along))
             openings.append((np.einsum("nmi,m->ni", self._moves[number], own) * across).sum(axis=1))
         return Parted(released=0.5 * float(self._force @ turned), openings=openings, turned=turned)
 
@@ -241,8 +242,3 @@ class ElasticCrack:
         moved = (cloth.drift - (self._back @ parted.turned).reshape(-1, 2))[cloth.corner]
         moved[self._touched] += np.einsum("ckmi,m->cki", self._way, parted.turned)
         return cloth.before - cloth.beyond(moved)
-
-
-def _turned(vectors: FloatArray) -> FloatArray:
-    """Return vectors (#N by 2) turned to the left by a right angle."""
-    return np.stack([-vectors[:, 1], vectors[:, 0]], axis=1)

@@ -24,7 +24,7 @@ from scipy.sparse import coo_array, csc_array, csr_array, diags_array, vstack
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import record
 from warpflat.core.sparse import factor_symmetric
-from warpflat.core.vectors import unit
+from warpflat.core.vectors import turned_left, unit
 from warpflat.flat.fabric.fabric import grain_axes
 from warpflat.flat.model.network import CellModel, SpringNetwork
 from warpflat.flat.solver.collapse import iterate_coarsenings
@@ -339,7 +339,7 @@ def _spring_rows(network: SpringNetwork, positions: FloatArray, part: CellModel)
     length = np.sqrt(np.einsum("ij,ij->i", d, d))
     along = d * (np.sqrt(stiffness) / length)[:, None]
     stretched = np.flatnonzero(length > rest)
-    across = _turned(along[stretched]) * np.sqrt(1.0 - rest[stretched] / length[stretched])[:, None]
+    across = turned_left(along[stretched]) * np.sqrt(1.0 - rest[stretched] / length[stretched])[:, None]
     return [
         _rows(count, of, np.stack([-vector, vector], axis=1))
         for of, vector in ((ends, along), (ends[stretched], across))
@@ -355,7 +355,7 @@ def _guard_rows(network: SpringNetwork, positions: FloatArray, part: slice) -> l
     a, b = p1 - p0, p2 - p0
     det = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     # Rows: the gradients of the barycentric weights of corners 1 and 2.
-    gradient = np.stack([_turned(-b), _turned(a)], axis=1) / det[:, None, None]
+    gradient = np.stack([turned_left(-b), turned_left(a)], axis=1) / det[:, None, None]
     rows = []
     axes = zip(grain_axes(network.grain_angle), (fabric.stiffness_warp, fabric.stiffness_weft), strict=True)
     for k, (axis, stiffness) in enumerate(axes):
@@ -373,7 +373,7 @@ def _guard_rows(network: SpringNetwork, positions: FloatArray, part: slice) -> l
             root = np.sqrt(stiffness * 0.5 * det[acts])
         unit = worn[acts] / stretch[:, None]
         excess = np.sqrt(1.0 - (1.0 + onset) / stretch)
-        for direction, size in ((unit, root), (_turned(unit), root * excess)):
+        for direction, size in ((unit, root), (turned_left(unit), root * excess)):
             back = np.einsum("cji,cj->ci", deformation, direction) * size[:, None]
             rows.append(_rows(count, corner, of_corner[:, :, None] * back[:, None, :]))
     return rows
@@ -405,8 +405,3 @@ def equation_rows(network: SpringNetwork, positions: FloatArray) -> csr_array:
     )
     rows.sum_duplicates()
     return rows
-
-
-def _turned(vectors: FloatArray) -> FloatArray:
-    """Return vectors (#N by 2) turned to the left by a right angle."""
-    return np.stack([-vectors[:, 1], vectors[:, 0]], axis=1)

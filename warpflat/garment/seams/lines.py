@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
 from warpflat.core import BoolArray, FloatArray
@@ -257,9 +258,7 @@ def _places(piece: Measured, anatomy: Anatomy) -> list[int]:
     """Return where a piece bulges, and where it stays beyond the cloth's limits: vertices, those of each kind with the most first."""
     vertices, faces = piece.surface.vertices, piece.surface.faces[:, :3].astype(np.int64)
     operators = Operators(vertices=vertices, faces=faces)
-    ahead, behind = (vertices[np.roll(faces, turn, axis=1)] - vertices[faces] for turn in (-1, 1))
-    angles = np.arctan2(np.linalg.norm(np.cross(ahead, behind), axis=2), (ahead * behind).sum(axis=2))
-    defect = 2.0 * np.pi - np.bincount(faces.ravel(), angles.ravel(), minlength=len(vertices))
+    defect = np.array(trimesh.Trimesh(vertices, faces, process=False).vertex_defects)
     defect[border_loops(piece.surface.faces)[0]] = 0.0
     fit = piece.result.fit
     beyond = np.where(fit.demand.beyond, fit.area, 0.0)

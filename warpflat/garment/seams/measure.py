@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from warpflat.core import FloatArray, InputError, arc_lengths, points_at_lengths
+from warpflat.core import FloatArray, InputError, arc_lengths, laid_upon, points_at_lengths
 from warpflat.flat import (
     Fabric,
     Flattening,
@@ -131,11 +131,8 @@ def _layout_before(
             if both.sum() < 2:
                 return None
             # It is turned and shifted onto the others along what they share.
-            here, there = own[both], laid[vertices[both]]
-            middle, goal = here.mean(axis=0), there.mean(axis=0)
-            u, _, v = np.linalg.svd((here - middle).T @ (there - goal))
-            turn = u @ np.diag([1.0, np.sign(np.linalg.det(u @ v))]) @ v
-            own = (own - middle) @ turn + goal
+            there = laid[vertices[both]]
+            own = laid_upon(there, own, both)
             own[both] = 0.5 * (own[both] + there)
         laid[vertices] = own
     p = laid[mesh.faces]
