@@ -194,7 +194,7 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
                 how = " on fold" if entry.on_fold else ", one mirrored" if entry.mirrored == 1 else ""
                 cut.append(translate(f"{{title}} {{count}}{how}", title=entry.title, count=entry.quantity))
             page.paragraph("; ".join(cut), indent=0.030, lead=translate_name(cloth))
-    page.heading(translate("Sewing order"), 3 * LINE)
+    page.heading(translate("Sewing order"), 3 * LINE + STEP_HEIGHT)
     page.paragraph(
         translate("Right sides together. Letters stand beside the notches; notches with the same letter meet.")
         + " "
