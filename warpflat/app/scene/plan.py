@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from warpflat.app.scene.cuts import CutSequence, cut_of_dart, plan_automatic_cuts, plan_cuts
 from warpflat.app.scene.form import scene_form, scene_recipe
-from warpflat.app.scene.found_seams import found_seams, plain_panel
+from warpflat.app.scene.found_seams import found_seams, plain_panel, seams_entry
 from warpflat.app.scene.frames import FrameRecorder
 from warpflat.app.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
 from warpflat.app.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands
@@ -60,6 +60,7 @@ from warpflat.garment import (
     select_bricks,
     sew_pieces,
     sized_opening,
+    unsewn_notes,
 )
 
 __all__ = ["GarmentPlan", "MeshPlan", "flatten_surface", "plan_garment", "plan_mesh", "plan_scene", "scene_cuts"]
@@ -189,6 +190,22 @@ class MeshPlan:
         """Return a piece with cuts that would help where it does not fit."""
         return advise(piece)
 
+    def notes(self, garment: Garment) -> list[str]:
+        """Return what is told of the garment besides: borders that may have been forgotten."""
+        # What lies beside a seam that was found, such as a hem, was not.
+        return [] if self.found is not None else unsewn_notes(garment)
+
+    def further_metrics(self, garment: Garment) -> dict[str, Any]:
+        """Return the entries of `metrics.json` that the garment does not know: the seams that were found."""
+        if self.found is None:
+            return {}
+        return {"garment": seams_entry(self.found, list(garment.pieces.values()), self.drawing.rules.seam)}
+
+    @property
+    def size(self) -> str:
+        """A mesh has no size."""
+        return ""
+
     def other_sizes(self) -> dict[str, GarmentPlan]:
         """A mesh has one size."""
         return {}
@@ -216,6 +233,7 @@ class GarmentPlan:
     constraints: Sequence[Constraint]
     openings: Sequence[Opening]
     settings: Mapping[str, Any]
+    found: ClassVar[None] = None
 
     @property
     def surfaces(self) -> list[Surface]:
@@ -282,6 +300,22 @@ class GarmentPlan:
             table = None if dart is None or row[-1] in on_fold else cut_of_dart(dart)
             remedies.append(replace(remedy, table=table))
         return advised.with_remedies(remedies) if remedies else advised
+
+    def notes(self, garment: Garment) -> list[str]:
+        """Return what is told of the garment besides: nothing."""
+        return []
+
+    def further_metrics(self, garment: Garment) -> dict[str, Any]:
+        """Return the entries of `metrics.json` that the garment does not know: how the scene gives its body."""
+        table = self.scene.settings.mannequin
+        assert table is not None
+        return {"mannequin": {**self.mannequin.metrics(), "table": table.model_dump(exclude_defaults=True)}}
+
+    @property
+    def size(self) -> str:
+        """The size of the mannequin."""
+        table = self.scene.settings.mannequin
+        return "" if table is None else table.size_name
 
     def other_sizes(self) -> dict[str, GarmentPlan]:
         """Return the garment in the sizes that its pattern has besides the mannequin's own.

@@ -15,7 +15,6 @@ from warpflat.app.review.page import pack_frames, pack_pictures, write_review
 from warpflat.app.scene.cuts import CutSequence
 from warpflat.app.scene.drape import drape_names, write_drape
 from warpflat.app.scene.form_shaping import ClosedDarts, require_open_darts, settle_shape
-from warpflat.app.scene.found_seams import seams_entry
 from warpflat.app.scene.frames import MANNEQUIN, Film, FrameSchedule
 from warpflat.app.scene.load import Scene
 from warpflat.app.scene.plan import GarmentPlan, MeshPlan, plan_scene
@@ -24,7 +23,6 @@ from warpflat.core import (
     Beside,
     StepError,
     expect_files,
-    file_in,
     latest_file,
     optional_file,
     optional_step,
@@ -34,16 +32,14 @@ from warpflat.core import (
     require_memory_for_run,
     require_own_metrics,
 )
-from warpflat.flat import Progress, Remedy, Surface, judge, size_words, triangulate
+from warpflat.flat import Progress, Remedy, Surface, judge, size_words
 from warpflat.garment import (
-    FormGarment,
     FormResult,
     Garment,
     Mannequin,
     WrittenPattern,
     garment_files,
     pattern_names,
-    unsewn_notes,
 )
 from warpflat.pattern import note_on_names
 
@@ -156,7 +152,6 @@ def _run(
     expect_files(folder, [f"{name}.draped.obj" for name in names] if settings.drape is not None else [])
     require_memory_for_run(vertices, frames=filmed)
     others = plan.other_sizes()
-    own_size = "" if settings.mannequin is None else settings.mannequin.size_name
 
     with ExitStack() as beside:
         with Film(folder, output, plan.surfaces, mannequin=body) as film:
@@ -168,8 +163,7 @@ def _run(
             garment = plan.flatten(callback=each_step, recorders=film.recorders)
             require_open_darts(scene, [garment])
             film.worn = garment.pieces
-            # What lies beside a seam that was found, such as a hem, is not a border that was forgotten.
-            notes = unsewn_notes(garment) if isinstance(plan, MeshPlan) and plan.found is None else []
+            notes = plan.notes(garment)
             fit = beside.enter_context(Beside(partial(_measure_fit, plan, garment, folder), "measuring how it fits"))
             drafted = _drafted(plan, garment) if filmed or output.picture else []
             film.drafted = [copy for piece in drafted for copy in piece.worn]
@@ -184,8 +178,8 @@ def _run(
                         callback=lambda _, progress: None if on_progress is None else on_progress(progress)
                     )
             require_open_darts(scene, graded.values())
-            sizes = {**graded, own_size: garment}
-            pattern = Beside(partial(_draft, plan, sizes, own_size, folder), "drafting the pattern")
+            sizes = {**graded, plan.size: garment}
+            pattern = Beside(partial(_draft, plan, sizes, folder), "drafting the pattern")
             # The paper tells the verdict, which a drape gives.
             if vertices < _MANY and settings.drape is None:
                 beside.enter_context(pattern)
@@ -198,7 +192,7 @@ def _run(
             with optional_step("it was not draped", of=StepError):
                 draped, drape_files = write_drape(scene, garment, folder, device=device)
                 files = list(dict.fromkeys([*drape_files, *files]))
-                sizes[own_size] = replace(sizes[own_size], drape=draped["drape"])
+                sizes[plan.size] = replace(sizes[plan.size], drape=draped["drape"])
         # What is ready is packed for the review while other processes write.
         page, reviewed = folder / "review.html", output.picture and output.review
         packed: Mapping[str, Any] | None = None
@@ -219,9 +213,6 @@ def _run(
         measured |= {**draped, **written.metrics}
         if (verdict := judge(measured)) is not None:
             measured["verdict"] = verdict.as_dict()
-        if settings.mannequin is not None:
-            table = settings.mannequin.model_dump(exclude_defaults=True)
-            measured["mannequin"] = {**measured["mannequin"], "table": table}
         if reviewed:
             with optional_file(page, files):
                 write_review(folder, measured, tuple(files), name=scene.name, film=lambda: packed, pictures=shown)
@@ -255,17 +246,8 @@ def _drafted(plan: MeshPlan | GarmentPlan, garment: Garment) -> list[DraftedOutl
             {"": garment}, name=garment.name, rules=plan.drawing.rules, cloth_width=plan.drawing.cloth_width
         )
         worn: Mapping[str, Sequence[Surface]] = {}
-        if isinstance(garment, FormGarment):
-            from warpflat.garment import place_drafted, surface_lift
-
-            lifts = {
-                name: surface_lift(
-                    flat.surface.vertices[flat.vertex_origin], flat.positions, triangulate(flat.faces)[0]
-                )
-                for name, flat in garment.pieces.items()
-            }
-            with optional_step("drafted pieces are not shown on the body", is_needed=False):
-                worn = place_drafted(pattern, lifts, garment.mannequin, next(iter(garment.pieces.values())).fabric)
+        with optional_step("drafted pieces are not shown on the body", is_needed=False):
+            worn = garment.place_drafted(pattern)
         drafted = [
             DraftedOutline(
                 name=piece.printed_name + (f", {piece.quantity} times" if piece.quantity > 1 else ""),
@@ -289,28 +271,15 @@ def _measure_fit(
     advised, files = garment, list[str]()
     with optional_step("no cuts that would help were looked for", is_needed=False):
         advised = garment.advised(plan.advise)
-    settings, wearer = plan.scene.settings, advised.wearer if isinstance(advised, FormGarment) else None
-    if settings.output.picture and (settings.wear is not None or (wearer is not None and wearer.is_stretched)):
-        if not isinstance(garment, FormGarment):
-            for name, part in advised.parts.items():
-                with optional_file(file_in(folder, name, ".wear.png"), files) as path:
-                    from warpflat.pattern import write_wear_sheet
-
-                    write_wear_sheet(path, [part], title=name)
-        else:
-            with optional_file(folder / "wear.png", files) as path:
-                from warpflat.pattern import write_wear_sheet
-
-                on_body = [] if wearer is None else [wearer.pieces[name].as_dict() for name in advised.pieces]
-                write_wear_sheet(path, list(advised.pieces.values()), title=garment.name, on_body=on_body)
+    stretched = advised.wearer is not None and advised.wearer.is_stretched
+    if plan.scene.settings.output.picture and (plan.scene.settings.wear is not None or stretched):
+        files = advised.write_wear(folder)
     remedies = {name: part.remedies for name, part in advised.parts.items()}
-    measured = advised.metrics()
-    if isinstance(plan, MeshPlan) and plan.found is not None:
-        measured["garment"] = seams_entry(plan.found, list(advised.pieces.values()), plan.drawing.rules.seam)
+    measured = {**advised.metrics(), **plan.further_metrics(advised)}
     return measured, advised.notes, remedies, files
 
 
-def _draft(plan: MeshPlan | GarmentPlan, sizes: Mapping[str, Garment], own_size: str, folder: Path) -> WrittenPattern:
+def _draft(plan: MeshPlan | GarmentPlan, sizes: Mapping[str, Garment], folder: Path) -> WrittenPattern:
     """Write the files of the pattern in all sizes, and the picture of a form's seams, which is among the files that are returned."""
     scene, wanted = plan.scene, plan.scene.settings.pattern.sizes
     if set(sizes) == set(wanted):
@@ -318,9 +287,9 @@ def _draft(plan: MeshPlan | GarmentPlan, sizes: Mapping[str, Garment], own_size:
     else:  # by their numbers where the scene leaves out the mannequin's own
         order = sorted(sizes, key=lambda size: (int("".join(filter(str.isdigit, size)) or 0), size))
     garments = {size: sizes[size] for size in order}
-    found = plan.found.seams if isinstance(plan, MeshPlan) and plan.found is not None else ()
+    found = () if plan.found is None else plan.found.seams
     pattern = garment_files(
-        garments, folder, name=scene.name, options=plan.drawing, sample_size=own_size, found_seams=found
+        garments, folder, name=scene.name, options=plan.drawing, sample_size=plan.size, found_seams=found
     )
     if plan.mannequin is None or not (scene.settings.output.picture and pattern.walked):
         return pattern

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core import IntArray, expect, expect_callback, expect_each
-from warpflat.flat import DEFAULT_FABRIC, TOUCHING, Fabric, Flattening, Progress, RelaxOptions, flatten_all
+from warpflat.core import IntArray, expect, expect_callback, expect_each, optional_file
+from warpflat.flat import DEFAULT_FABRIC, TOUCHING, Fabric, Flattening, Progress, RelaxOptions, flatten_all, triangulate
 from warpflat.garment.construction.constraints import (
     Constraint,
     DartMouth,
@@ -36,7 +36,8 @@ from warpflat.garment.mannequin.forms import FormResult
 from warpflat.garment.mannequin.mannequin import Mannequin
 
 if TYPE_CHECKING:
-    from warpflat.pattern import Body
+    from warpflat.flat import Surface
+    from warpflat.pattern import Body, Pattern
 
 __all__ = ["FormGarment", "flatten_form"]
 
@@ -94,7 +95,7 @@ class FormGarment(Garment):
         first, positions = next(iter(self.pieces.values())), self.positions
         return measure_rings(
             self.mannequin, self.form, positions, strain_limit=first.fabric.strain_limit,
-            girths=pattern_girths(self.mannequin, self.form, positions),
+            girths=self.girths,
             opened=with_plackets(
                 opened_rings(self.mannequin, self.form, positions, self.openings), self.finishing
             ),
@@ -106,12 +107,38 @@ class FormGarment(Garment):
         first = next(iter(self.pieces.values()))
         return assess_wearer(self.mannequin, self.form, self.positions, first.fabric, grain_angle=first.grain_angle)
 
+    @cached_property
+    def girths(self) -> Mapping[str, Mapping[str, float]]:
+        """What its pieces measure around the body, by level, as :func:`pattern_girths` gives them."""
+        return pattern_girths(self.mannequin, self.form, self.positions)
+
     @property
     def drawn_body(self) -> Body:
         """The body on which a picture shows it first."""
         from warpflat.pattern import Body
 
         return Body(vertices=self.mannequin.vertices, faces=np.asarray(self.mannequin.layout.faces, dtype=np.int32))
+
+    def place_drafted(self, pattern: Pattern) -> Mapping[str, Sequence[Surface]]:
+        """Return what of its pattern has no surface, such as collars, where it is worn, by piece."""
+        from warpflat.garment.draping.drape_pattern import place_drafted
+        from warpflat.garment.draping.lift import surface_lift
+
+        lifts = {
+            name: surface_lift(flat.surface.vertices[flat.vertex_origin], flat.positions, triangulate(flat.faces)[0])
+            for name, flat in self.pieces.items()
+        }
+        return place_drafted(pattern, lifts, self.mannequin, next(iter(self.pieces.values())).fabric)
+
+    def write_wear(self, folder: Path) -> list[str]:
+        """Draw how its pieces are strained on the form and on the body, on one sheet, and return its name."""
+        from warpflat.pattern import write_wear_sheet
+
+        files: list[str] = []
+        with optional_file(folder / "wear.png", files) as path:
+            on_body = [] if self.wearer is None else [self.wearer.pieces[name].as_dict() for name in self.pieces]
+            write_wear_sheet(path, list(self.pieces.values()), title=self.name, on_body=on_body)
+        return files
 
     def piece_measures(self) -> dict[str, dict[str, Any]]:
         """Return the entries of the pieces in `metrics.json`, with the strain energy brick by brick, and the darts."""
@@ -129,7 +156,7 @@ class FormGarment(Garment):
             "wear": {} if self.wearer is None else {"against": "form", "wearer": self.wearer.as_dict()},
             "mannequin": self.mannequin.metrics(),
             "pairs": [list(pair) for pair in self.pairs],
-            "girths": pattern_girths(self.mannequin, self.form, self.positions),
+            "girths": self.girths,
             "rings": [ring.as_dict() for ring in self.rings],
             **({} if self.curves is None else {"curves": self.curves.as_dict()}),
             **super().further_metrics(),

@@ -10,16 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core import FloatArray, IntArray, arc_lengths, polyline_length
+from warpflat.core import FloatArray, IntArray, arc_lengths, file_in, optional_file, polyline_length
 from warpflat.flat import BorderSeam, CutPattern, Flattening, mirror_images, run_metrics, separate
 from warpflat.garment.construction.sewn import MeasuredSeam, Sewn, Stitching
 
 if TYPE_CHECKING:
+    from warpflat.flat import Surface
     from warpflat.garment.construction.finishing import Finishing
     from warpflat.garment.construction.openings import Opening
     from warpflat.garment.construction.pockets import Pocket
     from warpflat.garment.construction.rings import GarmentRing
-    from warpflat.pattern import Body, DraftedOutline
+    from warpflat.garment.construction.wearer import WearerFit
+    from warpflat.pattern import Body, DraftedOutline, Pattern
 
 __all__ = ["Garment"]
 
@@ -142,9 +144,23 @@ class Garment:
         return ()
 
     @property
+    def wearer(self) -> WearerFit | None:
+        """How it fits the person whose body it was made on; None without one."""
+        return None
+
+    @property
+    def girths(self) -> Mapping[str, Mapping[str, float]]:
+        """The entry `girths` of `metrics.json`: what it measures around a body, by level; empty without one."""
+        return {}
+
+    @property
     def drawn_body(self) -> Body | None:
         """The body on which a picture shows it first."""
         return None
+
+    def place_drafted(self, pattern: Pattern) -> Mapping[str, Sequence[Surface]]:
+        """Return what of its pattern has no surface, such as collars, where it is worn, by piece; nothing without a body."""
+        return {}
 
     @cached_property
     def _images(self) -> dict[str, tuple[str, IntArray]]:
@@ -207,6 +223,16 @@ class Garment:
             files = self.write_files(to, picture=picture)
             write_report(to / "metrics.json", self.metrics(), name=self.name, files=files)
         return [*files, "metrics.json"]
+
+    def write_wear(self, folder: Path) -> list[str]:
+        """Draw how its parts are strained as they are worn, and return the names of the pictures."""
+        from warpflat.pattern import write_wear_sheet
+
+        files: list[str] = []
+        for name, part in self.parts.items():
+            with optional_file(file_in(folder, name, ".wear.png"), files) as path:
+                write_wear_sheet(path, [part], title=name)
+        return files
 
     def write_files(self, folder: Path, *, picture: bool, drafted: Sequence[DraftedOutline] = ()) -> list[str]:
         """Write an OBJ per piece and `picture.png`, but not `metrics.json`, and return their names.

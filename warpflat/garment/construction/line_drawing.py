@@ -16,7 +16,6 @@ from warpflat.flat import border_loops, judge, triangulate, vertex_normals
 from warpflat.garment.construction.button_stand import button_depths
 from warpflat.garment.construction.drawn_finishing import finishing_views
 from warpflat.garment.construction.form_garment import FormGarment
-from warpflat.garment.construction.girths import pattern_girths
 from warpflat.garment.construction.mark_openings import TIE_WIDTH
 from warpflat.garment.construction.openings import Buttons, place_opening
 from warpflat.pattern import ClothKind, Measure, NeededOpening, Piece, ViewedPiece, Worn
@@ -78,21 +77,21 @@ def describe_worn(
             seen = [*behind, *_wrapped(on_form, seen, names, sign), *before, *_openings(on_form, sign)]
             seen += _pockets(on_form, pieces, sign)
         views[name] = tuple(piece for piece in seen if piece.outlines or piece.lines)
-    measures = {}
-    for size, each in garments.items():
-        if isinstance(each, FormGarment):
-            girths = pattern_girths(each.mannequin, each.form, each.positions)
-            measures[size] = tuple(
-                Measure(
-                    name=without_side(level),
-                    body=girth["body_m"],
-                    finished=girth["pattern_m"],
-                    asked=girth.get("ease_wanted_m"),
-                )
-                for level, girth in girths.items()
-                # Arms and legs are told once.
-                if not (level.endswith(" right") and other_side(level) in girths)
+    measures = {
+        size: tuple(
+            Measure(
+                name=without_side(level),
+                body=girth["body_m"],
+                finished=girth["pattern_m"],
+                asked=girth.get("ease_wanted_m"),
             )
+            for level, girth in each.girths.items()
+            # Arms and legs are told once.
+            if not (level.endswith(" right") and other_side(level) in each.girths)
+        )
+        for size, each in garments.items()
+        if each.girths
+    }
     needed = tuple(
         NeededOpening(
             ring=ring.name, length=ring.length, over=ring.over, girth=ring.girth, depth=ring.opening_needed_mm / 1000
