@@ -89,7 +89,7 @@ class LaidCloth:
         cells, part = network.cell_arrays, network.cell_models[0]
         self.corner = cells.corner
         self.stiffness = cell_stiffness(network, self.positions, part)
-        self.solve = StiffnessFactor(network, self.positions).solve
+        self.solve = StiffnessFactor(network, self.positions, cells=self.stiffness).solve
         self.force = cell_forces(network, self.positions, part)
         used = cells.faces >= 0
         pull = np.zeros_like(self.positions)

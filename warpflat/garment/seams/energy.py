@@ -376,7 +376,7 @@ def _twin(number: int, pieces: Sequence[Measured], anatomy: Anatomy) -> int | No
         return None
     middles = np.array([one.mesh.vertices[one.mesh.faces].mean(axis=(0, 1)) for one in pieces])
     across = float(middles[number] @ anatomy.normal) - anatomy.offset
-    away = np.linalg.norm(middles - middles[number] + 2.0 * across * anatomy.normal, axis=1)
+    away = np.linalg.norm(middles - anatomy.image(middles[number]), axis=1)
     away[number] = np.inf
     nearest = int(away.argmin())
     if abs(across) < 0.04 * anatomy.size or away[nearest] > 0.06 * anatomy.size:

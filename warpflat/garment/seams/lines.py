@@ -14,7 +14,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, FloatArray
+from warpflat.core import BoolArray, FloatArray, reflected
 from warpflat.flat import ElasticCrack, LaidCloth, border_loops, components
 from warpflat.garment.seams.anatomy import ROLES, Anatomy
 from warpflat.garment.seams.by_hand import level_of
@@ -89,15 +89,14 @@ class Line:
 
     def mirrored(self, anatomy: Anatomy) -> Line:
         """Return its mirror image."""
-        n, level = anatomy.normal, self.level
+        level = self.level
         if level is not None and level[0] == LEFT:
             level = LEFT, -level[1]
-        point, start, end = (
-            None if one is None else _image(one, anatomy) for one in (self.point, self.start, self.end)
-        )
+        point, start, end = (None if one is None else anatomy.image(one) for one in (self.point, self.start, self.end))
         assert point is not None
-        normal = self.normal - 2.0 * float(self.normal @ n) * n
-        return replace(self, normal=normal, point=point, start=start, end=end, level=level)
+        return replace(
+            self, normal=reflected(self.normal, anatomy.normal), point=point, start=start, end=end, level=level
+        )
 
     def field(self, cloth: Cloth) -> FloatArray:
         """Return a field on the cloth that is zero along it, #V."""
@@ -234,7 +233,7 @@ def _darts(
         if whole and np.abs(across[[mouth, tip]]).max() > middle:
             if np.abs(across[[mouth, tip]]).min() < middle or across[mouth] * across[tip] < 0.0:
                 continue
-            near = ((loop, _image(start, anatomy)), (inner, _image(end, anatomy)))
+            near = ((loop, anatomy.image(start)), (inner, anatomy.image(end)))
             away_from = [np.linalg.norm(surface.vertices[among] - image, axis=1) for among, image in near]
             pairs.append((int(loop[away_from[0].argmin()]), int(inner[away_from[1].argmin()])))
         rows = [row for pair in pairs if (row := _straight(laid, *pair)) is not None]
@@ -380,8 +379,3 @@ def _at_hem(cloth: Cloth, vertices: Ids, anatomy: Anatomy) -> BoolArray:
     low = heights[vertices] < heights.min() + _HEM * np.ptp(heights)
     ends = np.isin(role, [1 + ROLES.index(name) for name in ("hem", "sleeve", "leg")])
     return np.asarray(ends | (low & (role == 1 + ROLES.index("opening"))))
-
-
-def _image(point: FloatArray, anatomy: Anatomy) -> FloatArray:
-    """Return the mirror image of a point [m]."""
-    return point - 2.0 * (float(point @ anatomy.normal) - anatomy.offset) * anatomy.normal
