@@ -1,22 +1,26 @@
 """The paper: from a surface to a flat layout, and its cuts."""
 
-from .cutting.candidates import Peaks as Peaks
 from .cutting.candidates import find_candidates as find_candidates
 from .cutting.candidates import find_peaks as find_peaks
+from .cutting.candidates import row_in as row_in
 from .cutting.crack import ElasticCrack as ElasticCrack
 from .cutting.crack import LaidCloth as LaidCloth
+from .cutting.crack import Price as Price
+from .cutting.crack import price as price
 from .cutting.cut_piece import cut as cut
 from .cutting.cut_plan import CutPlan as CutPlan
 from .cutting.cut_plan import draw_line as draw_line
 from .cutting.cut_plan import line_part as line_part
 from .cutting.dart_move import move_dart as move_dart
+from .cutting.ledger import LISTED as LISTED
+from .cutting.ledger import TRIED as TRIED
 from .cutting.ledger import AutoCut as AutoCut
 from .cutting.ledger import Ledger as Ledger
 from .cutting.ledger import LedgerEntry as LedgerEntry
 from .cutting.ledger import RankedBy as RankedBy
+from .cutting.ledger import best_of_few as best_of_few
 from .cutting.ledger import cut_automatically as cut_automatically
 from .cutting.ledger import make_ledger as make_ledger
-from .cutting.ledger import try_all as try_all
 from .cutting.open_tube import open_tube as open_tube
 from .cutting.open_tube import open_with_cuts as open_with_cuts
 from .cutting.open_tube import without_overlaps as without_overlaps

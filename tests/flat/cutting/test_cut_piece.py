@@ -463,7 +463,7 @@ def test_no_way_inwards_begins_beside_an_earlier_cut():
     assert ways
     mouths = np.array([path.points[0] for one in ways for path in one.drawn])
     assert np.linalg.norm(mouths - first.drawn[0].points[0], axis=1).min() > 0.03
-    result, _ = cut_automatically(flat, AutoCut(max_cuts=3), fully=False)
+    result, _ = cut_automatically(flat, AutoCut(max_cuts=3))
     names = [made.name for made in result.cuts]
     assert len(set(names)) == len(names) > 0
 
