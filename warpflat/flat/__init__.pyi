@@ -1,19 +1,14 @@
 """The paper: from a surface to a flat layout, and its cuts."""
 
 from .cutting.candidates import find_candidates as find_candidates
-from .cutting.candidates import find_peaks as find_peaks
-from .cutting.candidates import row_in as row_in
-from .cutting.crack import ElasticCrack as ElasticCrack
+from .cutting.candidates import peaks_in_words as peaks_in_words
 from .cutting.crack import LaidCloth as LaidCloth
 from .cutting.crack import Price as Price
-from .cutting.crack import price as price
 from .cutting.cut_piece import cut as cut
 from .cutting.cut_plan import CutPlan as CutPlan
 from .cutting.cut_plan import draw_line as draw_line
 from .cutting.cut_plan import line_part as line_part
 from .cutting.dart_move import move_dart as move_dart
-from .cutting.ledger import LISTED as LISTED
-from .cutting.ledger import TRIED as TRIED
 from .cutting.ledger import AutoCut as AutoCut
 from .cutting.ledger import Ledger as Ledger
 from .cutting.ledger import LedgerEntry as LedgerEntry

@@ -10,7 +10,7 @@ from warpflat.app.scene.cuts import place_of, scene_with
 from warpflat.app.scene.form import scene_recipe
 from warpflat.app.scene.ledger import candidate_cuts, trial_of_scene, try_cuts, with_cut
 from warpflat.app.scene.load import Scene
-from warpflat.flat import TRIED, AutoCut, Flattening, LedgerEntry, RankedBy
+from warpflat.flat import AutoCut, Flattening, LedgerEntry, RankedBy
 from warpflat.garment import (
     ELBOW,
     NEAR_ARMHOLE,
@@ -86,9 +86,9 @@ def _cut(
         asked = [name for name in wanting if name not in known]
         cuts = list(candidate_cuts(plan, garment, usual_only=usual_only)) if asked else []
         for name in asked:
-            known[name] = try_cuts(plan, garment, [one for one in cuts if one[0]["piece"] == name], by=by, most=TRIED)[
-                0
-            ]
+            known[name] = try_cuts(
+                plan, garment, [one for one in cuts if one[0]["piece"] == name], by=by, listed=False
+            )[0]
         helpful = [
             entry
             for name in wanting

@@ -13,7 +13,6 @@ from warpflat.app.scene.load import Scene, errors_named, scene_relax_options
 from warpflat.app.scene.plan import GarmentPlan, flatten_surface, plan_garment, scene_cuts
 from warpflat.core import InputError
 from warpflat.flat import (
-    LISTED,
     CutPlan,
     LaidCloth,
     Ledger,
@@ -23,10 +22,8 @@ from warpflat.flat import (
     best_of_few,
     coarse_options,
     find_candidates,
-    find_peaks,
     make_ledger,
-    price,
-    row_in,
+    peaks_in_words,
 )
 from warpflat.garment import (
     FormDart,
@@ -58,7 +55,7 @@ def scene_ledger(scene: Scene, *, by: RankedBy = "per_cm", device: str | None = 
         if not entries:
             why = "; ".join(f"{name}: {reason}" for name, reason in refused[:1]) or "its pieces store no energy"
             raise InputError(f"{scene.where}: there is no cut to compare: {why}")
-        peaks = [f"{name}: {place}" for name, piece in garment.pieces.items() for place in find_peaks(piece).words]
+        peaks = [f"{name}: {words}" for name, piece in garment.pieces.items() for words in peaks_in_words(piece)]
         return Ledger(
             name=scene.name,
             pieces=tuple(garment.pieces.values()),
@@ -126,12 +123,12 @@ def candidate_cuts(
     def priced(dart: FormDart) -> Iterator[tuple[dict[str, Any], Price]]:
         grid = form.pieces[dart.piece].grid_vertices
         rows = [
-            row_in(laid[dart.piece], grid, row)
+            laid[dart.piece].row_of(grid, row)
             for piece, row in dart_rows(layout, form.vertices, bricks, dart)
             if piece == dart.piece
         ]
         if found := [row for row in rows if row is not None]:
-            yield cut_of_dart(dart), price(laid[dart.piece], found)
+            yield cut_of_dart(dart), laid[dart.piece].price(found)
 
     for dart in usual_darts(layout, form.vertices, bricks):
         if dart.place not in present:
@@ -186,7 +183,7 @@ def try_cuts(
     cuts: Sequence[tuple[Mapping[str, Any], Price]],
     *,
     by: RankedBy,
-    most: int = LISTED,
+    listed: bool = True,
 ) -> tuple[tuple[LedgerEntry, ...], tuple[tuple[str, str], ...]]:
     """Try the cuts of a form that promise most on their pieces, each on its own; see :func:`warpflat.flat.cutting.ledger.best_of_few`."""
 
@@ -217,7 +214,7 @@ def try_cuts(
             cut=cut,
         )
 
-    return best_of_few([(_name(cut), cost, cut) for cut, cost in cuts], evaluate, by=by, most=most)
+    return best_of_few([(_name(cut), cost, cut) for cut, cost in cuts], evaluate, by=by, listed=listed)
 
 
 def _name(cut: Mapping[str, Any]) -> str:

@@ -17,19 +17,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.arrays import BoolArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
-from warpflat.flat.cutting.crack import LaidCloth, Price, price
+from warpflat.flat.cutting.crack import LaidCloth, Price
 from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.surface.energy_map import energy_map, energy_peak
+from warpflat.flat.surface.energy_map import place_in_words, smooth_to_vertices
 from warpflat.flat.surface.half_edges import border_edges
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.paths.edge_paths import path_length
 from warpflat.flat.surface.paths.geodesic import distance_from
 from warpflat.flat.surface.paths.trace import SurfacePath, polyline_path
 
-__all__ = ["Candidate", "Peaks", "find_candidates", "find_peaks", "row_in"]
+__all__ = ["Candidate", "find_candidates", "find_peaks", "peaks_in_words"]
 
 Ids = NDArray[np.int64]
 
@@ -73,38 +73,22 @@ class Candidate:
     has_twin: bool = False
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Peaks:
-    """Maxima of the energy density inside a piece, away from its border.
-
-    Attributes:
-        vertices: of the uncut surface, highest first.
-        words: the place of each.
-    """
-
-    vertices: tuple[int, ...]
-    words: tuple[str, ...]
-
-
-def find_peaks(result: Flattening, *, landmarks: Mapping[str, int] | None = None) -> Peaks:
-    """Find the highest points of the smoothed energy density inside a piece.
-
-    Args:
-        result: the flattened piece.
-        landmarks: named vertices of its surface, for the words.
-    """
-    surface = result.surface
-    size = _diagonal(surface)
+def find_peaks(result: Flattening) -> tuple[int, ...]:
+    """Return the vertices of the uncut surface where the smoothed energy density inside a piece peaks, highest first."""
+    surface, size = result.surface, _diagonal(result.surface)
     # On the cut surface energy does not spread across a crack; copies of a vertex are then put together again.
-    apart = energy_map(result.network.surface, result.face_energy_density, smoothing_length=_SMOOTHING * size)
+    apart = smooth_to_vertices(result.network.surface, result.face_energy_density, smoothing_length=_SMOOTHING * size)
     density = np.zeros(len(surface.vertices))
-    np.maximum.at(density, result.vertex_origin, apart.vertex_density)
-    on_border = _border(result)
-    chosen = _highest(surface, np.where(on_border, -1.0, density), apart=_APART * size)
-    spikes = np.zeros((len(chosen), len(surface.vertices)))
-    spikes[np.arange(len(chosen)), chosen] = 1.0
-    words = tuple(energy_peak(surface, spike, landmarks=dict(landmarks or {})).words for spike in spikes)
-    return Peaks(vertices=tuple(chosen), words=words)
+    np.maximum.at(density, result.vertex_origin, apart)
+    density[_border(result)] = -1.0
+    chosen: list[int] = []
+    for vertex in np.argsort(-density, kind="stable").tolist():
+        if density[vertex] <= 0 or (chosen and density[vertex] < _NEARLY_AS_HIGH * density[chosen[0]]):
+            break
+        gap = np.linalg.norm(surface.vertices[chosen] - surface.vertices[vertex], axis=1)
+        if len(chosen) < _MOST_PEAKS and gap.min(initial=np.inf) > _APART * size:
+            chosen.append(vertex)
+    return tuple(chosen)
 
 
 def find_candidates(result: Flattening, places: Sequence[int] | None = None) -> tuple[Candidate, ...]:
@@ -120,7 +104,7 @@ def find_candidates(result: Flattening, places: Sequence[int] | None = None) -> 
     Raises:
         InputError: the piece stores no energy away from its border, so there is nowhere to cut to.
     """
-    places = find_peaks(result).vertices if places is None else places
+    places = find_peaks(result) if places is None else places
     if not len(places) or result.layout_measures["length_error"] < _FREE_OF_STRAIN:
         raise InputError(f"piece {result.surface.name!r} stores no strain energy inside: there is nothing to cut for")
     laid = LaidCloth(result.network, result.positions)
@@ -154,7 +138,7 @@ def find_candidates(result: Flattening, places: Sequence[int] | None = None) -> 
         both = Candidate(
             name=f"{a.name} and {b.name.removeprefix(along + ' from ')}" if same else f"{a.name} + {b.name}",
             paths=a.paths + b.paths,
-            price=price(laid, [row, other]),
+            price=laid.price([row, other]),
             drawn=a.drawn + b.drawn,
             places=tuple(sorted({*a.places, *b.places})),
         )
@@ -163,24 +147,9 @@ def find_candidates(result: Flattening, places: Sequence[int] | None = None) -> 
     return (*(pair for pair, _ in pairs), *(replace(one, has_twin=one.name in twins) for one, _ in found.values()))
 
 
-def row_in(laid: LaidCloth, origin: IntArray, row: IntArray) -> Ids | None:
-    """Return a row of a piece's vertices as vertices of its layout, in which cuts have doubled some; None if it touches the border inside.
-
-    Args:
-        laid: the piece.
-        origin: #V, for each vertex of the layout the one of the piece.
-        row: along edges, from the border.
-    """
-    order, edges = np.argsort(origin, kind="stable"), laid.half_edges.edges
-    inner = order[np.searchsorted(origin, row[1:-1], sorter=order)]
-    if len(inner) == 0 or laid.border[inner].any():
-        return None
-    # Of the copies of an end the one beside the row.
-    ends = (
-        np.intersect1d(np.flatnonzero(origin == end), edges[(edges == beside).any(axis=1)])[:1]
-        for end, beside in ((row[0], inner[0]), (row[-1], inner[-1]))
-    )
-    return np.concatenate([next(ends), inner, next(ends)]).astype(np.int64)
+def peaks_in_words(result: Flattening) -> tuple[str, ...]:
+    """Return the places of the peaks of a piece's energy as sentences, highest first."""
+    return tuple(place_in_words(result.surface, vertex) for vertex in find_peaks(result))
 
 
 def _diagonal(surface: Surface) -> float:
@@ -209,10 +178,10 @@ def _along_line(
     def priced(
         title: str, path: IntArray, part: Sequence[float] = (), places: tuple[int, ...] = ()
     ) -> Iterator[tuple[Candidate, Ids]]:
-        row = row_in(laid, result.vertex_origin, path)
+        row = laid.row_of(result.vertex_origin, path)
         if row is not None:
             table = {"line": name} | ({"part": list(part)} if part else {})
-            yield Candidate(name=title, paths=(path,), price=price(laid, [row]), places=places, table=table), row
+            yield Candidate(name=title, paths=(path,), price=laid.price([row]), places=places, table=table), row
 
     passes = False
     for number, place in enumerate(places):
@@ -272,7 +241,7 @@ def _straight(
                 drawn = (polyline_path(surface, path[[0, -1]].tolist()),)
         ends = [[round(x, 5) for x in surface.vertices[end].tolist()] for end in path[[0, -1]]]
         table = dict(zip(("from", "to"), ends, strict=True))
-        cost = price(laid, [row])
+        cost = laid.price([row])
         yield Candidate(name=title, paths=(path,), price=cost, drawn=drawn, places=(number,), table=table), row
 
     if not laid.border[place]:
@@ -296,24 +265,6 @@ def _straight(
         aim = (1.0 - share) * flat[start] + share * flat[middle]
         tip = int(inner[np.linalg.norm(flat[inner] - aim, axis=1).argmin()])
         yield from priced(f"{kind} {_last_number(result, 'inward') + number + 1}", laid.dart(start, tip))
-
-
-def _highest(surface: Surface, height: FloatArray, *, apart: float) -> list[int]:
-    """Return the vertices where a positive value peaks, highest first.
-
-    Args:
-        surface: with #V vertices.
-        height: #V, the value.
-        apart: least distance between two of them [m].
-    """
-    chosen: list[int] = []
-    for vertex in np.argsort(-height, kind="stable").tolist():
-        if height[vertex] <= 0 or (chosen and height[vertex] < _NEARLY_AS_HIGH * height[chosen[0]]):
-            break
-        gap = [float(np.linalg.norm(surface.vertices[vertex] - surface.vertices[other])) for other in chosen]
-        if len(chosen) < _MOST_PEAKS and min(gap, default=np.inf) > apart:
-            chosen.append(vertex)
-    return chosen
 
 
 def _last_number(result: Flattening, kind: str) -> int:

@@ -25,7 +25,7 @@ from scipy.linalg import null_space
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import arc_lengths
 from warpflat.core.vectors import turned_left, unit
 from warpflat.flat.model.network import SpringNetwork
@@ -34,7 +34,7 @@ from warpflat.flat.solver.metric import StiffnessFactor, cell_forces, cell_stiff
 from warpflat.flat.surface.connectivity import border_of, join_labels
 from warpflat.flat.surface.half_edges import half_edges_of, opposite_half_edges
 
-__all__ = ["ElasticCrack", "LaidCloth", "Parted", "Price", "price"]
+__all__ = ["ElasticCrack", "LaidCloth", "Parted", "Price"]
 
 Ids = NDArray[np.int64]
 
@@ -165,6 +165,38 @@ class LaidCloth:
             found.append(int(before[found[-1]]))
         return None if rim[found].any() else np.array(found[::-1])
 
+    def row_of(self, origin: IntArray, path: IntArray) -> Ids | None:
+        """Return a path as vertices of the layout, in which cuts have doubled some; None if it touches the border on its way.
+
+        Args:
+            origin: #V, for each vertex of the layout what the path calls it.
+            path: along edges, from border to border or to a place inside.
+        """
+        order, edges = np.argsort(origin, kind="stable"), self.half_edges.edges
+        inner = order[np.searchsorted(origin, path[1:-1], sorter=order)]
+        if len(inner) == 0 or self.border[inner].any():
+            return None
+        # Of the copies of an end the one beside the path.
+        first, last = (
+            np.intersect1d(np.flatnonzero(origin == end), edges[(edges == beside).any(axis=1)])[:1]
+            for end, beside in ((path[0], inner[0]), (path[-1], inner[-1]))
+        )
+        return np.concatenate([first, inner, last]).astype(np.int64)
+
+    def price(self, rows: Sequence[Ids]) -> Price:
+        """Return what a cut along rows of vertices would do, such as a row and its mirror image."""
+        crack = ElasticCrack(self, rows)
+        parted = crack.part([(0, len(at) - 1) for at in crack.at])
+        widest = max(float(opening.max()) for opening in parted.openings)
+        over = max(-float(opening.min()) for opening in parted.openings)
+        return Price(
+            released=parted.released,
+            relieved=crack.relieved(parted),
+            length=sum(float(at[-1]) for at in crack.at),
+            opening=widest,
+            opens=all(self.border[row[[0, -1]]].all() for row in rows) or over <= max(_OVER, _OVER_SHARE * widest),
+        )
+
     def dart(self, mouth: int, tip: int) -> Ids | None:
         """Return the vertices of a straight dart in the layout; None if it meets the border, or runs along it and would leave a flap."""
         way, points = self.positions[tip] - self.positions[mouth], self.positions
@@ -288,18 +320,3 @@ class ElasticCrack:
         moved = (cloth.drift - (self._back @ parted.turned).reshape(-1, 2))[cloth.corner]
         moved[self._touched] += np.einsum("ckmi,m->cki", self._way, parted.turned)
         return cloth.before - cloth.beyond(moved)
-
-
-def price(cloth: LaidCloth, rows: Sequence[Ids]) -> Price:
-    """Return what a cut along rows of vertices would do, such as a row and its mirror image."""
-    crack = ElasticCrack(cloth, rows)
-    parted = crack.part([(0, len(at) - 1) for at in crack.at])
-    widest = max(float(opening.max()) for opening in parted.openings)
-    over = max(-float(opening.min()) for opening in parted.openings)
-    return Price(
-        released=parted.released,
-        relieved=crack.relieved(parted),
-        length=sum(float(at[-1]) for at in crack.at),
-        opening=widest,
-        opens=all(cloth.border[row[[0, -1]]].all() for row in rows) or over <= max(_OVER, _OVER_SHARE * widest),
-    )

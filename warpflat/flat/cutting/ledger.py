@@ -14,7 +14,7 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.core.short_repr import short_repr
-from warpflat.flat.cutting.candidates import Candidate, find_candidates, find_peaks
+from warpflat.flat.cutting.candidates import Candidate, find_candidates, peaks_in_words
 from warpflat.flat.cutting.crack import Price
 from warpflat.flat.cutting.cut_piece import cut
 from warpflat.flat.cutting.cut_plan import CutPlan
@@ -25,8 +25,6 @@ from warpflat.flat.solver.options import RelaxOptions, coarse_options
 from warpflat.flat.surface.cut.dart import dart_measure, fish_eye_measure
 
 __all__ = [
-    "LISTED",
-    "TRIED",
     "AutoCut",
     "Ledger",
     "LedgerEntry",
@@ -39,8 +37,8 @@ __all__ = [
 
 RankedBy = Literal["per_cm", "released"]
 
-#: So many cuts are tried for a ledger, and so many for a choice.
-LISTED, TRIED = 8, 3
+# So many cuts are tried for a ledger, and so many for a choice.
+_LISTED, _TRIED = 8, 3
 # A dart that takes in less is not sewn but eased in [m].
 _LEAST_MOUTH = 5e-3
 
@@ -249,7 +247,7 @@ def best_of_few(
     evaluate: Callable[[Cut], LedgerEntry],
     *,
     by: RankedBy,
-    most: int = LISTED,
+    listed: bool = True,
 ) -> tuple[tuple[LedgerEntry, ...], tuple[tuple[str, str], ...]]:
     """Try the cuts that promise most; return what each would do, the best first, and those that are refused, and why.
 
@@ -257,8 +255,9 @@ def best_of_few(
         cuts: the name and the price of each.
         evaluate: tries one.
         by: what the order goes by: energy released per centimetre cut, or in all.
-        most: so many are tried.
+        listed: eight are tried, to be compared; else three, of which one is chosen.
     """
+    most = _LISTED if listed else _TRIED
 
     def promise(cost: Price) -> tuple[bool, float]:
         return not cost.opens, -(cost.per_metre if by == "per_cm" else cost.released)
@@ -282,7 +281,7 @@ def make_ledger(
     relax: RelaxOptions | None = None,
     by: RankedBy = "per_cm",
     candidates: Sequence[Candidate] | None = None,
-    most: int = LISTED,
+    listed: bool = True,
 ) -> Ledger:
     """Try the candidates on a flattened piece that promise most, each coarsely, and rank them.
 
@@ -291,26 +290,24 @@ def make_ledger(
         relax: options of the full relaxation, from which the coarse ones follow.
         by: what the order goes by: energy released per centimetre cut, or in all.
         candidates: to compare; those of :func:`warpflat.flat.cutting.candidates.find_candidates` if not given.
-        most: so many are tried.
+        listed: see :func:`best_of_few`.
 
     Raises:
         InputError: there is nothing to cut for, or no candidate can be made.
     """
-    peaks = find_peaks(result)
-    chosen = find_candidates(result, peaks.vertices) if candidates is None else candidates
+    words = peaks_in_words(result)
+    chosen = find_candidates(result) if candidates is None else candidates
     coarse = coarse_options(relax)
     cuts = [(one.name, one.price, one) for one in chosen]
-    entries, refused = best_of_few(cuts, lambda one: evaluate(result, one, relax=coarse), by=by, most=most)
+    entries, refused = best_of_few(cuts, lambda one: evaluate(result, one, relax=coarse), by=by, listed=listed)
     if not entries:
         why = (
             f"{refused[0][0]}: {refused[0][1]}" if refused
-            else f"none passes near the peak of its energy ({peaks.words[0]}), and no way of any length leads there or inwards from "
+            else f"none passes near the peak of its energy ({words[0]}), and no way of any length leads there or inwards from "
             "the border; draw a line through it"
         )  # fmt: skip
         raise InputError(f"piece {result.surface.name!r} has no line to cut along: {why}")
-    return Ledger(
-        name=result.surface.name, pieces=(result,), peaks=tuple(peaks.words), entries=entries, refused=refused
-    )
+    return Ledger(name=result.surface.name, pieces=(result,), peaks=words, entries=entries, refused=refused)
 
 
 def evaluate(result: Flattening, candidate: Candidate, *, relax: RelaxOptions) -> LedgerEntry:
@@ -391,7 +388,7 @@ def cut_automatically(
         try:
             # Of two cuts that mirror each other, both are made or none.
             candidates = [one for one in find_candidates(result) if not one.has_twin]
-            ledger = make_ledger(result, relax=relax, by=auto.by, candidates=candidates, most=TRIED)
+            ledger = make_ledger(result, relax=relax, by=auto.by, candidates=candidates, listed=False)
         except InputError:
             if not ledgers:
                 raise

@@ -15,7 +15,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from warpflat.core import BoolArray, FloatArray, reflected
-from warpflat.flat import LaidCloth, border_loops, components, price
+from warpflat.flat import LaidCloth, border_loops, components
 from warpflat.garment.seams.anatomy import ROLES, Anatomy
 from warpflat.garment.seams.by_hand import level_of
 from warpflat.garment.seams.cloth import Cloth
@@ -156,7 +156,7 @@ def offers(
         *(_darts(cloth, piece, laid, places, anatomy, twice=twice) if not options.forbids("dart") else ()),
         *(_seams(cloth, piece, laid, places, anatomy, options, twice=twice) if may_part else ()),
     ):
-        cost, sides = price(laid, rows), 2 if twice else 1
+        cost, sides = laid.price(rows), 2 if twice else 1
         if not line.parts and not (cost.opens and MOUTH <= cost.opening <= WIDE * cost.length / len(rows)):
             continue
         more = sides * len(rows) if line.parts else 0
