@@ -229,13 +229,14 @@ def _straight(
     Of a place near the border two lead from there inwards.
     """
     surface, size, flat = result.surface, _diagonal(result.surface), laid.positions
+    quads = bool(surface.is_quad.all())
     place = int(np.flatnonzero(result.vertex_origin == places[number])[0])
 
     def priced(title: str, row: Ids | None) -> Iterator[tuple[Candidate, Ids]]:
         if row is None or path_length(surface, [path := result.vertex_origin[row]]) <= _SHORTEST * size:
             return
         drawn: tuple[SurfacePath, ...] = ()
-        if not surface.is_quad.all():
+        if not quads:
             # On triangles, whose edges lead nowhere in particular, it is drawn.
             with suppress(InputError):
                 drawn = (polyline_path(surface, path[[0, -1]].tolist()),)
@@ -249,7 +250,8 @@ def _straight(
         around = [
             one for row in rows for one in priced(f"free path {_last_number(result, 'free path') + number + 1}", row)
         ]
-        yield from sorted(around, key=lambda one: -one[0].price.per_metre)[:1]
+        # Sheared quads give way along their diagonals, which a crack in the membrane does not know: of theirs the shortest.
+        yield from sorted(around, key=lambda one: one[0].price.length if quads else -one[0].price.per_metre)[:1]
     rim = np.flatnonzero(laid.border & np.isin(result.vertex_origin, border_edges(surface.faces)))
     start = int(rim[np.linalg.norm(flat[rim] - flat[place], axis=1).argmin()])
     made = (path for one in result.cuts for path in one.paths)
