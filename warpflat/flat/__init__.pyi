@@ -71,6 +71,7 @@ from .flattening.step_by_step import RelaxationStep as RelaxationStep
 from .flattening.step_by_step import relaxation as relaxation
 from .flattening.straight_band import cut_straight as cut_straight
 from .flattening.straight_band import find_band as find_band
+from .flattening.verdict import TOO_LARGE as TOO_LARGE
 from .flattening.verdict import Verdict as Verdict
 from .flattening.verdict import judge as judge
 from .model.constraint_equations import ConstraintEquations as ConstraintEquations

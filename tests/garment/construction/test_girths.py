@@ -20,3 +20,13 @@ def test_an_armhole_is_as_long_as_it_was_drafted(form: str, fabric: str):
         assert armhole["pattern_m"] == pytest.approx(armhole["form_m"], abs=1e-3)
         assert armhole["body_m"] == pytest.approx(polyline_length(body.line(f"armhole {side}")), abs=1e-9)
     assert girths["neck"]["pattern_m"] == pytest.approx(girths["neck"]["form_m"], rel=0.03)
+
+
+@pytest.mark.parametrize(("size", "longer"), [("EU 38", 0.0226), ("EU 46", 0.015)])
+def test_an_armhole_without_sleeve_that_would_be_too_large_is_taken_in(size: str, longer: float):
+    """As the cloth rests it is longer by 2.3 and 3.1 %."""
+    body = body_of_size(30.0, size)
+    garment = flatten_form(body, body.form("bodice"), fabric="woven", curves_mm=0.0)
+    for side in ("left", "right"):
+        armhole = pattern_girths(body, garment.form, garment.positions)[f"armhole {side}"]
+        assert armhole["pattern_m"] == pytest.approx((1.0 + longer) * armhole["form_m"], rel=1e-3)

@@ -17,12 +17,12 @@ from warpflat.core.text import other_side, without_side
 from warpflat.flat.flattening.fit_report import no_cut_words, remedy_words
 from warpflat.flat.model.fit import TOLERATED
 
-__all__ = ["Finding", "Verdict", "judge"]
+__all__ = ["TOO_LARGE", "Finding", "Verdict", "judge"]
 
 # Cloth that presses harder is felt as too tight [Pa]: discomfort begins at 60 gf/cm2 (Denton 1972, Fit, stretch and comfort).
 _COMFORT = 5.9e3
-# A garment is too large if its girth exceeds the drafted one by this share: two thirds of the step between sizes, 4 cm on 88.
-_TOO_LARGE = 0.03
+#: A garment is too large if its girth exceeds the drafted one by this share: two thirds of the step between sizes, 4 cm on 88.
+TOO_LARGE = 0.03
 # Girths that every garment is judged by; others where ease was asked for.
 _MAIN_GIRTHS = ("bust", "waist", "hip", "neck", "armhole")
 # Ease that is missed by more is told [m].
@@ -185,7 +185,7 @@ def _girths(girths: Mapping[str, Mapping[str, float]]) -> list[Finding]:
             continue
         name, asked = without_side(level) if alike else level, girth.get("ease_wanted_m")
         ease, drafted = girth["ease_m"], girth["form_m"] - girth["body_m"]
-        if (asked is not None or without_side(level) in _MAIN_GIRTHS) and ease - drafted > _TOO_LARGE * girth["form_m"]:
+        if (asked is not None or without_side(level) in _MAIN_GIRTHS) and ease - drafted > TOO_LARGE * girth["form_m"]:
             found.append(
                 Finding(
                     kind="too large",

@@ -26,7 +26,7 @@ from warpflat.garment.construction.ease import SeamRatios, SeamWish, seam_ratios
 from warpflat.garment.construction.finishing import with_plackets
 from warpflat.garment.construction.fullness import give_fullness
 from warpflat.garment.construction.garment import Garment
-from warpflat.garment.construction.girths import girth_constraints, pattern_girths
+from warpflat.garment.construction.girths import girth_constraints, loose_armholes, pattern_girths
 from warpflat.garment.construction.openings import opened_rings
 from warpflat.garment.construction.rings import GarmentRing, measure_rings
 from warpflat.garment.construction.sewing import sew
@@ -233,6 +233,9 @@ def flatten_form(
 
     def sewn_under(held: Sequence[Constraint]) -> FormGarment:
         result = sew(full, garment.stitching, constraints=held, folds=folds, options=relax)
+        if loose := loose_armholes(mannequin, form, {name: piece.positions for name, piece in result.pieces.items()}):
+            held = [*held, *loose]
+            result = sew(full, garment.stitching, constraints=held, folds=folds, options=relax)
         found = replace(garment, pieces=result.pieces, sewn=result, wished=wished)
         return _with_curves(found, 1e-3 * curves_mm, held, folds, relax) if curves_mm else found
 

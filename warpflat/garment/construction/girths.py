@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.core import FloatArray, IntArray, segment_lengths, without_side
+from warpflat.flat import TOO_LARGE
 from warpflat.garment.construction.constraints import KeptGirth
 from warpflat.garment.construction.tapes import ALONG, PieceEdges, RowEdges, stretch_tape
 from warpflat.garment.construction.wearer import body_rows
@@ -23,11 +24,11 @@ if TYPE_CHECKING:
     from warpflat.garment.mannequin.layout import Layout
     from warpflat.garment.mannequin.mannequin import Mannequin
 
-__all__ = ["girth_constraints", "pattern_girths"]
+__all__ = ["girth_constraints", "loose_armholes", "pattern_girths"]
 
 
 def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]) -> list[KeptGirth]:
-    """Return constraints that give every level the ease that a form asks for, and armholes with sleeves their length.
+    """Return constraints that give every level the ease that a form asks for, and armholes with sleeves their drafted length.
 
     Cloth at rest loses some of the ease to strain, or has more elsewhere. An armhole gives way to the longer cap that is
     eased into it.
@@ -45,25 +46,39 @@ def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping
     for level, girth in pattern_girths(mannequin, form, positions).items():
         if "ease_wanted_m" in girth:
             edges = piece_edges.along(*([_row(layout, level)] if level in RING_LEVELS else limbs[level]))
-            factor = (girth["body_m"] + girth["ease_wanted_m"]) / girth["pattern_m"]
-        elif level in lines and np.isin(lines[level][0], sleeves).all():
-            edges = lines[level][1]
-            factor = girth["form_m"] / girth["pattern_m"]
-        else:
-            continue
-        assert edges is not None
-        found.append(
-            KeptGirth(
-                level=level,
-                edges=edges.ends,
-                shares=edges.shares,
-                lengths={
-                    name: factor * np.linalg.norm(positions[name][ends[:, 0]] - positions[name][ends[:, 1]], axis=1)
-                    for name, ends in edges.ends.items()
-                },
+            found.append(
+                _kept(level, edges, (girth["body_m"] + girth["ease_wanted_m"]) / girth["pattern_m"], positions)
             )
-        )
+        elif level in lines and np.isin(lines[level][0], sleeves).all():
+            found.append(_kept(level, lines[level][1], girth["form_m"] / girth["pattern_m"], positions))
     return found
+
+
+def loose_armholes(mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]) -> list[KeptGirth]:
+    """Return constraints that take in the armholes which came out too large, to half of what is too large.
+
+    Args:
+        mannequin: the body.
+        form: on it.
+        positions: by piece, #V by 2, sewn [m].
+    """
+    girths = pattern_girths(mannequin, form, positions)
+    found = []
+    for level, (_, edges) in _lines(mannequin.layout, form).items():
+        longer = girths[level]["pattern_m"] / girths[level]["form_m"]
+        if level != "neck" and longer > 1.0 + 0.9 * TOO_LARGE:
+            found.append(_kept(level, edges, (1.0 + 0.5 * TOO_LARGE) / longer, positions))
+    return found
+
+
+def _kept(level: str, edges: RowEdges | None, factor: float, positions: Mapping[str, FloatArray]) -> KeptGirth:
+    """Return the constraint that a level has its length in the pattern times a factor."""
+    assert edges is not None
+    lengths = {
+        name: factor * np.linalg.norm(positions[name][ends[:, 0]] - positions[name][ends[:, 1]], axis=1)
+        for name, ends in edges.ends.items()
+    }
+    return KeptGirth(level=level, edges=edges.ends, shares=edges.shares, lengths=lengths)
 
 
 def pattern_girths(
