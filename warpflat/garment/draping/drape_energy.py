@@ -20,10 +20,12 @@ from warpflat.core import (
 )
 from warpflat.flat import Fabric, Point, Solve, make_cloth
 from warpflat.garment.draping.body import Body
+from warpflat.garment.draping.layers import APART, Layers
 from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.sewn_cloth import SewnCloth
 from warpflat.kernels.drape import Bending, Contact, Motion, evaluate_cloth, evaluate_curvature, gather_drape
 from warpflat.kernels.drape_contact import anchor_friction, carry_contact, find_planes, load_contact
+from warpflat.kernels.drape_layers import press_layers
 from warpflat.kernels.drape_stiffness import stiffen_cloth, stiffen_contact
 from warpflat.kernels.membrane_cell import Cloth
 
@@ -43,9 +45,10 @@ _FAR_COMPRESSION, _FAR_PULL = 0.3, 10.0
 
 
 class DrapeEnergy:
-    """Energy of membrane, bending, weight, contact and friction, with its arrays on a device.
+    """Energy of membrane, bending, weight, contact with body and layers, and friction, with its arrays on a device.
 
     Attributes:
+        layers: what of the cloth lies beside its vertices.
         motion: state of the vertices on the device.
         contact: the body's planes on the device.
         device: where they are.
@@ -86,18 +89,28 @@ class DrapeEnergy:
         bending = Bending()
         bending.offset, bending.neighbor = self._on(laplacian.indptr, wp.int32), self._on(laplacian.indices, wp.int32)
         bending.weight, bending.stiffness = self._on(laplacian.data, wp.float64), self._on(stiffness, wp.float64)
-        moment, force = self._zeros(wp.vec3d), wp.zeros(3 * len(corner), wp.vec3d, device)
-        offset = self._on(range_offsets(np.bincount(corner.ravel(), minlength=count)), wp.int32)
-        entry = self._on(np.argsort(corner.ravel(), kind="stable").astype(np.int32), wp.int32)
+        # After the forces of the cells come those between layers, on each vertex and the triangles before and behind it.
+        moment, force = self._zeros(wp.vec3d), wp.zeros(3 * len(corner) + 8 * count, wp.vec3d, device)
+        offset, entry = wp.zeros(count + 1, wp.int32, device), wp.zeros(len(force), wp.int32, device)
+        self._corner, self.layers = corner, Layers(cloth, device)
+        self._list_forces(offset, entry)
         x, at = self.motion.position, {"device": device}
         self._cells = [x, self._on(corner, wp.vec3i), self._on(gradient, wp.vec4d), self._on(area, wp.float64), law]
-        self._cell_energy, self._energy = wp.zeros(len(corner), wp.float64, device), self._zeros(wp.float64)
+        self._cell_energy, self._energy = wp.zeros(len(corner) + 2 * count, wp.float64, device), self._zeros(wp.float64)
         self._force = self._zeros(wp.vec3d)
         self.forces_of = [offset, entry, force, bending, moment]
         outputs = [force, self._cell_energy]
         self.evaluate_cells = [
             record(evaluate_cloth, dim=len(corner), inputs=self._cells, outputs=outputs, least=512, **at),
             record(evaluate_curvature, dim=count, inputs=[x, bending], outputs=[moment], least=512, **at),
+            record(
+                press_layers,
+                dim=2 * count,
+                inputs=[x, *self.layers.beside, APART, len(corner)],
+                outputs=outputs,
+                least=512,
+                **at,
+            ),
         ]
         inputs = [self.motion, self._ground, self.contact, *self.forces_of]
         outputs = [self._force, self._energy]
@@ -111,6 +124,18 @@ class DrapeEnergy:
         self._renew = Sequence([*self.planes, *self.evaluate_cells])
         self._keep = body
         self._solve: Solve | None = None
+
+    def _list_forces(self, offset: wp.array, entry: wp.array) -> None:
+        """List where the forces on each vertex are: offset (#V+1) and entry are written."""
+        layered = np.column_stack([np.repeat(np.arange(self._count), 2), self.layers.corner])
+        on = np.concatenate([self._corner.ravel(), layered.ravel()])
+        offset.assign(range_offsets(np.bincount(on, minlength=self._count)).astype(np.int32))
+        entry.assign(np.argsort(on, kind="stable").astype(np.int32))
+
+    def renew_layers(self) -> None:
+        """Look for the layers of cloth beside each vertex."""
+        if self.layers.renew(self.motion.position.numpy()):
+            self._list_forces(*self.forces_of[:2])
 
     def _on(self, values: object, dtype: object) -> wp.array:
         return wp.array(np.ascontiguousarray(values), dtype=dtype, device=self.device)
@@ -167,7 +192,9 @@ class DrapeEnergy:
         cells = self._cell_stiffness(positions, *((self._law, self._near_pull) if near else (self._far_law, _FAR_PULL)))
         inputs = [self.motion, self.contact, least]
         launch_each(stiffen_contact, self._count, inputs, [vertices], device=self.device, least=512)
-        return self._pattern.matrix(cells, vertices.numpy())
+        between = self.layers.stiffness(positions)
+        whole = self._pattern.matrix(cells, vertices.numpy())
+        return csc_array(whole + between) if between.nnz else whole
 
     def cell_stiffness(self, positions: FloatArray) -> FloatArray:
         """Return the stiffness of each cell somewhere by its corners, #C by 3 by 3 corners by 3 by 3 coordinates [N/m]."""
@@ -175,7 +202,7 @@ class DrapeEnergy:
 
     def _cell_stiffness(self, positions: FloatArray, law: Cloth, pull: float) -> FloatArray:
         self.motion.position.assign(positions)
-        count = len(self._cell_energy)
+        count = len(self._corner)
         cells = wp.zeros(9 * count, wp.mat33d, self.device)
         launch_each(stiffen_cloth, count, [*self._cells[:-1], law, pull], [cells], device=self.device, least=512)
         return cells.numpy().copy()

@@ -122,6 +122,7 @@ class _DynamicRelaxation:
 
     def run(self, steps: int) -> None:
         """Take steps from the present places."""
+        self._energy.renew_layers()
         for _ in range(steps // _STEPS_PER_PLANE):
             self._round.launch()
 
@@ -240,5 +241,6 @@ def _minimise(energy: DrapeEnergy, tolerance: float, *, near: bool) -> float:
         left = float(np.linalg.norm(descent.point.gradient, axis=1).mean()) / weight
     point = descent.point
     energy.carry_contact(point.positions)
+    energy.renew_layers()
     energy.motion.velocity.zero_()
     return float(np.linalg.norm(point.gradient, axis=1).mean()) / weight
