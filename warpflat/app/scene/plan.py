@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from warpflat.app.scene.cuts import CutSequence, cut_of_dart, plan_automatic_cuts, plan_cuts
 from warpflat.app.scene.form import scene_form
@@ -31,6 +31,7 @@ from warpflat.flat import (
     cut_surfaces,
     flatten,
     flatten_all,
+    triangulate,
 )
 from warpflat.garment import (
     CURVES_MM,
@@ -62,6 +63,9 @@ from warpflat.garment import (
     sized_opening,
     unsewn_notes,
 )
+
+if TYPE_CHECKING:
+    from warpflat.pattern import Pattern
 
 __all__ = ["GarmentPlan", "MeshPlan", "flatten_surface", "plan_garment", "plan_mesh", "plan_scene", "scene_cuts"]
 
@@ -201,6 +205,10 @@ class MeshPlan:
             return {}
         return {"garment": seams_entry(self.found, list(garment.pieces.values()), self.drawing.rules.seam)}
 
+    def place_drafted(self, garment: Garment, pattern: Pattern) -> Mapping[str, Sequence[Surface]]:
+        """Return what of a pattern has no surface, such as collars, where it is worn, by piece: nothing, as nobody wears a mesh."""
+        return {}
+
     @property
     def size(self) -> str:
         """A mesh has no size."""
@@ -310,6 +318,16 @@ class GarmentPlan:
         table = self.scene.settings.mannequin
         assert table is not None
         return {"mannequin": {**self.mannequin.metrics(), "table": table.model_dump(exclude_defaults=True)}}
+
+    def place_drafted(self, garment: Garment, pattern: Pattern) -> Mapping[str, Sequence[Surface]]:
+        """Return what of a pattern has no surface, such as collars, where it is worn, by piece."""
+        from warpflat.garment import place_drafted, surface_lift
+
+        lifts = {
+            name: surface_lift(flat.surface.vertices[flat.vertex_origin], flat.positions, triangulate(flat.faces)[0])
+            for name, flat in garment.pieces.items()
+        }
+        return place_drafted(pattern, lifts, self.mannequin, next(iter(garment.pieces.values())).fabric)
 
     @property
     def size(self) -> str:

@@ -247,7 +247,7 @@ def _drafted(plan: MeshPlan | GarmentPlan, garment: Garment) -> list[DraftedOutl
         )
         worn: Mapping[str, Sequence[Surface]] = {}
         with optional_step("drafted pieces are not shown on the body", is_needed=False):
-            worn = garment.place_drafted(pattern)
+            worn = plan.place_drafted(garment, pattern)
         drafted = [
             DraftedOutline(
                 name=piece.printed_name + (f", {piece.quantity} times" if piece.quantity > 1 else ""),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core import IntArray, expect, expect_callback, expect_each, optional_file
-from warpflat.flat import DEFAULT_FABRIC, TOUCHING, Fabric, Flattening, Progress, RelaxOptions, flatten_all, triangulate
+from warpflat.flat import DEFAULT_FABRIC, TOUCHING, Fabric, Flattening, Progress, RelaxOptions, flatten_all
 from warpflat.garment.construction.constraints import (
     Constraint,
     DartMouth,
@@ -36,8 +36,7 @@ from warpflat.garment.mannequin.forms import FormResult
 from warpflat.garment.mannequin.mannequin import Mannequin
 
 if TYPE_CHECKING:
-    from warpflat.flat import Surface
-    from warpflat.pattern import Body, Pattern
+    from warpflat.pattern import Body
 
 __all__ = ["FormGarment", "flatten_form"]
 
@@ -118,17 +117,6 @@ class FormGarment(Garment):
         from warpflat.pattern import Body
 
         return Body(vertices=self.mannequin.vertices, faces=np.asarray(self.mannequin.layout.faces, dtype=np.int32))
-
-    def place_drafted(self, pattern: Pattern) -> Mapping[str, Sequence[Surface]]:
-        """Return what of its pattern has no surface, such as collars, where it is worn, by piece."""
-        from warpflat.garment.draping.drape_pattern import place_drafted
-        from warpflat.garment.draping.lift import surface_lift
-
-        lifts = {
-            name: surface_lift(flat.surface.vertices[flat.vertex_origin], flat.positions, triangulate(flat.faces)[0])
-            for name, flat in self.pieces.items()
-        }
-        return place_drafted(pattern, lifts, self.mannequin, next(iter(self.pieces.values())).fabric)
 
     def write_wear(self, folder: Path) -> list[str]:
         """Draw how its pieces are strained on the form and on the body, on one sheet, and return its name."""

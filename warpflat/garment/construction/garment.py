@@ -15,13 +15,12 @@ from warpflat.flat import BorderSeam, CutPattern, Flattening, mirror_images, run
 from warpflat.garment.construction.sewn import MeasuredSeam, Sewn, Stitching
 
 if TYPE_CHECKING:
-    from warpflat.flat import Surface
     from warpflat.garment.construction.finishing import Finishing
     from warpflat.garment.construction.openings import Opening
     from warpflat.garment.construction.pockets import Pocket
     from warpflat.garment.construction.rings import GarmentRing
     from warpflat.garment.construction.wearer import WearerFit
-    from warpflat.pattern import Body, DraftedOutline, Pattern
+    from warpflat.pattern import Body, DraftedOutline
 
 __all__ = ["Garment"]
 
@@ -157,10 +156,6 @@ class Garment:
     def drawn_body(self) -> Body | None:
         """The body on which a picture shows it first."""
         return None
-
-    def place_drafted(self, pattern: Pattern) -> Mapping[str, Sequence[Surface]]:
-        """Return what of its pattern has no surface, such as collars, where it is worn, by piece; nothing without a body."""
-        return {}
 
     @cached_property
     def _images(self) -> dict[str, tuple[str, IntArray]]:
