@@ -1,4 +1,4 @@
-"""Rows of vectors: unit and turned ones, and points that are laid upon others."""
+"""Rows of vectors: unit, turned and reflected ones, and points that are laid upon others."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["laid_upon", "turned_left", "unit"]
+__all__ = ["laid_upon", "reflected", "turned_left", "unit"]
 
 # A vector shorter than this has no direction, and stays as short.
 _SHORTEST = 1e-300
@@ -20,6 +20,11 @@ def unit(vectors: FloatArray) -> FloatArray:
 def turned_left(vectors: FloatArray) -> FloatArray:
     """Return vectors (#N by 2) turned to the left by a right angle."""
     return np.stack([-vectors[:, 1], vectors[:, 0]], axis=1)
+
+
+def reflected(points: FloatArray, normal: FloatArray, offset: float = 0.0) -> FloatArray:
+    """Return the mirror images of points (... by #D [m]) in the plane normal . x = offset [m]; of directions without an offset."""
+    return np.asarray(points - 2.0 * (points @ normal - offset)[..., None] * normal)
 
 
 def laid_upon(target: FloatArray, points: FloatArray, rows: slice | BoolArray | IntArray = slice(None)) -> FloatArray:

@@ -1,10 +1,9 @@
 """The paper: from a surface to a flat layout, and its cuts."""
 
-from .cutting.candidates import Peaks as Peaks
 from .cutting.candidates import find_candidates as find_candidates
-from .cutting.candidates import find_peaks as find_peaks
-from .cutting.crack import ElasticCrack as ElasticCrack
+from .cutting.candidates import peaks_in_words as peaks_in_words
 from .cutting.crack import LaidCloth as LaidCloth
+from .cutting.crack import Price as Price
 from .cutting.cut_piece import cut as cut
 from .cutting.cut_plan import CutPlan as CutPlan
 from .cutting.cut_plan import draw_line as draw_line
@@ -14,9 +13,9 @@ from .cutting.ledger import AutoCut as AutoCut
 from .cutting.ledger import Ledger as Ledger
 from .cutting.ledger import LedgerEntry as LedgerEntry
 from .cutting.ledger import RankedBy as RankedBy
+from .cutting.ledger import best_of_few as best_of_few
 from .cutting.ledger import cut_automatically as cut_automatically
 from .cutting.ledger import make_ledger as make_ledger
-from .cutting.ledger import try_all as try_all
 from .cutting.open_tube import open_tube as open_tube
 from .cutting.open_tube import open_with_cuts as open_with_cuts
 from .cutting.open_tube import without_overlaps as without_overlaps

@@ -92,6 +92,7 @@ from .mannequin.darts import FormDart as FormDart
 from .mannequin.darts import PlacedDart as PlacedDart
 from .mannequin.darts import dart_along as dart_along
 from .mannequin.darts import dart_part as dart_part
+from .mannequin.darts import dart_rows as dart_rows
 from .mannequin.darts import place_darts as place_darts
 from .mannequin.darts import usual_darts as usual_darts
 from .mannequin.ease import EASE_PRESETS as EASE_PRESETS

@@ -48,8 +48,8 @@ def cuts(
 ) -> int:
     """Compare cuts: where the energy is, and what each candidate would release.
 
-    Candidates are the feature lines through or near the peaks of the energy, whole or from the border to the peak, paths
-    that follow the energy and, on a form, the darts of a pattern book. Each is tried with a coarse relaxation, without the
+    Candidates are the feature lines through or near the peaks of the energy, whole or from the border to the peak, straight
+    ways there and, on a form, the darts of a pattern book. The eight that promise most are tried with a coarse relaxation, without the
     scene's seams and constraints; --apply relaxes fully, with them. Writes ledger.json and ledger.png, on a form cuts.toml,
     too, and with --apply all that a run leaves.
 

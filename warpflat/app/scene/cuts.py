@@ -161,7 +161,7 @@ def plan_automatic_cuts(
     result = flatten_and_cut(sequence, flatten=flatten, relax=coarse_options(relax))
     why = "none would release energy without overlapping"
     try:
-        result, _ = cut_automatically(result, search, relax=relax, fully=False)
+        result, _ = cut_automatically(result, search, relax=relax)
     except InputError as nowhere:
         why = str(nowhere)
     plans = tuple(CutPlan.from_applied(made) for made in result.cuts)

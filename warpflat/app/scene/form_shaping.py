@@ -81,12 +81,14 @@ def _cut(
     made: list[LedgerEntry] = []
     known: dict[str, tuple[LedgerEntry, ...]] = {}
     while most is None or len(made) < most:
-        base = trial_of_scene(scene, device=device)
-        wanting = [name for name, piece in base.garment.pieces.items() if not is_enough(piece)]
-        for name in wanting:
-            if name not in known:
-                cuts = [cut for cut in candidate_cuts(base, usual_only=usual_only) if cut["piece"] == name]
-                known[name] = try_cuts(base, cuts, by=by)[0]
+        plan, garment = trial_of_scene(scene, device=device)
+        wanting = [name for name, piece in garment.pieces.items() if not is_enough(piece)]
+        asked = [name for name in wanting if name not in known]
+        cuts = list(candidate_cuts(plan, garment, usual_only=usual_only)) if asked else []
+        for name in asked:
+            known[name] = try_cuts(
+                plan, garment, [one for one in cuts if one[0]["piece"] == name], by=by, listed=False
+            )[0]
         helpful = [
             entry
             for name in wanting

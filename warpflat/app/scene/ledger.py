@@ -1,10 +1,10 @@
-"""The ledger of a scene's cuts: what each candidate would release, tried on a mesh, or on a form's piece and the mirror image of that."""
+"""The ledger of a scene's cuts: those that promise most, tried on a mesh, or on a form's piece and the mirror image of that."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from warpflat.app.scene.cuts import CutSequence, cut_of_dart, cuts_beside, flatten_and_cut, place_of, scene_with
@@ -14,29 +14,30 @@ from warpflat.app.scene.plan import GarmentPlan, flatten_surface, plan_garment, 
 from warpflat.core import InputError
 from warpflat.flat import (
     CutPlan,
+    LaidCloth,
     Ledger,
     LedgerEntry,
-    Peaks,
+    Price,
     RankedBy,
+    best_of_few,
     coarse_options,
     find_candidates,
-    find_peaks,
     make_ledger,
-    try_all,
+    peaks_in_words,
 )
 from warpflat.garment import (
-    Form,
+    FormDart,
     Garment,
     Mannequin,
     dart_along,
+    dart_rows,
     flatten_form,
     is_side,
     princess_seams,
-    select_bricks,
     usual_darts,
 )
 
-__all__ = ["FormTrial", "candidate_cuts", "cuts_of_entry", "scene_ledger", "trial_of_scene", "try_cuts", "with_cut"]
+__all__ = ["candidate_cuts", "cuts_of_entry", "scene_ledger", "trial_of_scene", "try_cuts", "with_cut"]
 
 
 def scene_ledger(scene: Scene, *, by: RankedBy = "per_cm", device: str | None = None) -> Ledger:
@@ -49,15 +50,15 @@ def scene_ledger(scene: Scene, *, by: RankedBy = "per_cm", device: str | None = 
         InputError: the scene is wrong, or there is nothing to cut for.
     """
     if scene.settings.mannequin is not None:
-        base = trial_of_scene(scene, device=device)
-        entries, refused = try_cuts(base, list(candidate_cuts(base)), by=by)
+        plan, garment = trial_of_scene(scene, device=device)
+        entries, refused = try_cuts(plan, garment, list(candidate_cuts(plan, garment)), by=by)
         if not entries:
             why = "; ".join(f"{name}: {reason}" for name, reason in refused[:1]) or "its pieces store no energy"
             raise InputError(f"{scene.where}: there is no cut to compare: {why}")
-        peaks = [f"{name}: {place}" for name, found in base.peaks.items() for place in found.words]
+        peaks = [f"{name}: {words}" for name, piece in garment.pieces.items() for words in peaks_in_words(piece)]
         return Ledger(
             name=scene.name,
-            pieces=tuple(base.garment.pieces.values()),
+            pieces=tuple(garment.pieces.values()),
             peaks=tuple(peaks),
             entries=entries,
             refused=refused,
@@ -86,47 +87,14 @@ def cuts_of_entry(ledger: Ledger, number: int) -> CutSequence:
     return CutSequence(surface=result.surface, plans=tuple(CutPlan.from_applied(made) for made in result.cuts))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class FormTrial:
-    """A scene's pieces, relaxed coarsely one by one, with the legs of their darts sewn.
-
-    Attributes:
-        plan: the scene's garment.
-        recipe: its form.
-        garment: the pieces.
-    """
-
-    plan: GarmentPlan
-    recipe: Form
-    garment: Garment
-
-    @property
-    def mannequin(self) -> Mannequin:
-        """The body."""
-        return self.plan.mannequin
-
-    @property
-    def bricks(self) -> dict[str, list[str]]:
-        """The bricks of every piece, on both sides of the body."""
-        layout = self.mannequin.layout
-        return {name: select_bricks(layout, recipe.bricks) for name, recipe in self.recipe.pieces.items()}
-
-    @cached_property
-    def peaks(self) -> dict[str, Peaks]:
-        """Where the energy of the pieces is, without those that store none inside."""
-        found = {name: find_peaks(piece) for name, piece in self.garment.pieces.items()}
-        return {name: peaks for name, peaks in found.items() if peaks.vertices}
-
-
-def trial_of_scene(scene: Scene, *, device: str | None = None) -> FormTrial:
-    """Flatten a scene's pieces one by one.
+def trial_of_scene(scene: Scene, *, device: str | None = None) -> tuple[GarmentPlan, Garment]:
+    """Return a scene's garment, and its pieces, relaxed coarsely one by one, with the legs of their darts sewn.
 
     Raises:
         InputError: as :func:`warpflat.app.scene.plan.plan_garment`.
     """
     plan = plan_garment(scene, device=device)
-    _, recipe = scene_recipe(scene, plan.mannequin)
-    return FormTrial(plan=plan, recipe=recipe, garment=_flatten(plan, plan.form.pieces))
+    return plan, _flatten(plan, plan.form.pieces)
 
 
 def _flatten(plan: GarmentPlan, names: Sequence[str] | Mapping[str, Any], scene: Scene | None = None) -> Garment:
@@ -137,31 +105,46 @@ def _flatten(plan: GarmentPlan, names: Sequence[str] | Mapping[str, Any], scene:
     return flatten_form(plan.mannequin, alone, **settings)
 
 
-def candidate_cuts(base: FormTrial, *, usual_only: bool = False) -> Iterator[dict[str, Any]]:
-    """Yield tables of cuts that the pieces do not have yet: once a side, as both sides are cut.
+def candidate_cuts(
+    plan: GarmentPlan, garment: Garment, *, usual_only: bool = False
+) -> Iterator[tuple[dict[str, Any], Price]]:
+    """Yield tables of cuts that the pieces do not have yet: once a side, as both sides are cut; and what they would do.
 
     Args:
-        base: the pieces before them.
+        plan, garment: the pieces before them (see `trial_of_scene`).
         usual_only: the darts of a pattern book only.
     """
-    layout, bricks, form = base.mannequin.layout, base.bricks, base.plan.form
-    present = {dart.place for dart in base.recipe.darts}
-    names = {(dart.piece, dart.name) for dart in base.recipe.darts}
+    layout, bricks, form = plan.mannequin.layout, plan.bricks, plan.form
+    present = {dart.place for dart in form.recipe.darts}
+    names = {(dart.piece, dart.name) for dart in form.recipe.darts}
+    unsewn = {name: piece.unsewn or piece for name, piece in garment.pieces.items()}
+    laid = {name: LaidCloth(piece.network, piece.positions) for name, piece in unsewn.items()}
+
+    def priced(dart: FormDart) -> Iterator[tuple[dict[str, Any], Price]]:
+        grid = form.pieces[dart.piece].grid_vertices
+        rows = [
+            laid[dart.piece].row_of(grid, row)
+            for piece, row in dart_rows(layout, form.vertices, bricks, dart)
+            if piece == dart.piece
+        ]
+        if found := [row for row in rows if row is not None]:
+            yield cut_of_dart(dart), laid[dart.piece].price(found)
+
     for dart in usual_darts(layout, form.vertices, bricks):
         if dart.place not in present:
-            yield cut_of_dart(dart if (dart.piece, dart.like) in names else replace(dart, like=None))
+            yield from priced(dart if (dart.piece, dart.like) in names else replace(dart, like=None))
     if usual_only:
         return
     found: set[tuple[Any, ...]] = set()
     for dart in (dart for name, own in bricks.items() for dart in princess_seams(layout, own, name)):
         found.add((dart.piece, dart.line, dart.part))
-        yield cut_of_dart(dart)
-    for name, piece in base.garment.pieces.items():
+        yield from priced(dart)
+    for name, piece in unsewn.items():
         if all(is_side(brick, "right") for brick in bricks[name]):
             continue
         # From the border along lines to the peaks of its energy, and along whole lines.
         try:
-            candidates = find_candidates(piece, base.peaks.get(name))
+            candidates = find_candidates(piece)
         except InputError:
             continue
         for candidate in candidates:
@@ -172,7 +155,7 @@ def candidate_cuts(base: FormTrial, *, usual_only: bool = False) -> Iterator[dic
             along = dart_along(layout, form.vertices, bricks[name], row, piece=name, name=words)
             if along is not None and (key := (along.piece, along.line, along.part)) not in found:
                 found.add(key)
-                yield cut_of_dart(along)
+                yield from priced(along)
 
 
 def with_cut(scene: Scene, cut: Mapping[str, Any], mannequin: Mannequin | None = None) -> Scene:
@@ -195,19 +178,24 @@ def with_cut(scene: Scene, cut: Mapping[str, Any], mannequin: Mannequin | None =
 
 
 def try_cuts(
-    base: FormTrial, cuts: Sequence[Mapping[str, Any]], *, by: RankedBy
+    plan: GarmentPlan,
+    garment: Garment,
+    cuts: Sequence[tuple[Mapping[str, Any], Price]],
+    *,
+    by: RankedBy,
+    listed: bool = True,
 ) -> tuple[tuple[LedgerEntry, ...], tuple[tuple[str, str], ...]]:
-    """Try cuts of a form on their pieces, each on its own; return them, the best first, and those that are refused, and why."""
+    """Try the cuts of a form that promise most on their pieces, each on its own; see :func:`warpflat.flat.cutting.ledger.best_of_few`."""
 
     def evaluate(cut: Mapping[str, Any]) -> LedgerEntry:
-        scene = with_cut(base.plan.scene, cut, base.mannequin)
+        scene = with_cut(plan.scene, cut, plan.mannequin)
         try:
-            form = scene_form(scene, base.mannequin)[1]
-            before = base.plan.form.pieces
+            form = scene_form(scene, plan.mannequin)[1]
+            before = plan.form.pieces
             legs = form.legs()
             darts = [d for d in form.darts if d.asked.place == place_of(cut) and (d.piece, d.name) in legs]
             changed = {dart.piece for dart in darts} or set(form.pieces) - set(before)
-            garment = _flatten(base.plan, [name for name in form.pieces if name in changed], scene)
+            made = _flatten(plan, [name for name in form.pieces if name in changed], scene)
         except InputError as reason:
             raise InputError(str(reason).removeprefix(f"{scene.where}: ")) from None
         paths = [form.vertices[dart.row] for dart in darts]
@@ -219,14 +207,14 @@ def try_cuts(
         ]
         return LedgerEntry.measure(
             _name(cut),
-            [base.garment.pieces[name] for name in before if name in changed or name not in form.pieces],
-            list(garment.pieces.values()),
+            [garment.pieces[name] for name in before if name in changed or name not in form.pieces],
+            list(made.pieces.values()),
             paths=paths,
-            cracks=[(garment.pieces[d.piece], *legs[d.piece, d.name]) for d in darts],
+            cracks=[(made.pieces[d.piece], *legs[d.piece, d.name]) for d in darts],
             cut=cut,
         )
 
-    return try_all(cuts, _name, evaluate, by=by)
+    return best_of_few([(_name(cut), cost, cut) for cut, cost in cuts], evaluate, by=by, listed=listed)
 
 
 def _name(cut: Mapping[str, Any]) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.app.scene.cuts import CutSequence, cut_of_dart, plan_automatic_cuts, plan_cuts
-from warpflat.app.scene.form import scene_form, scene_recipe
+from warpflat.app.scene.form import scene_form
 from warpflat.app.scene.found_seams import found_seams, plain_panel
 from warpflat.app.scene.frames import FrameRecorder
 from warpflat.app.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
@@ -267,8 +267,8 @@ class GarmentPlan:
     @cached_property
     def bricks(self) -> dict[str, list[str]]:
         """The bricks of every piece, on both sides of the body."""
-        recipe, layout = scene_recipe(self.scene, self.mannequin)[1], self.mannequin.layout
-        return {name: select_bricks(layout, piece.bricks) for name, piece in recipe.pieces.items()}
+        recipe = self.form.recipe
+        return {name: select_bricks(self.mannequin.layout, piece.bricks) for name, piece in recipe.pieces.items()}
 
     def advise(self, piece: Flattening) -> Flattening:
         """Return a piece with cuts that would help, each with the table of a scene's `[[cuts]]` that makes it, if one can."""

@@ -1,31 +1,37 @@
-"""Candidates for a cut: along feature lines near the peaks of the energy, along free paths that follow it, and inwards from the border.
+"""Candidates for a cut, each with its price: along feature lines near some places, straight from the border to them, and inwards.
 
-A candidate runs from the border to a peak, from border to border, or, where the peak is at the border, from there inwards.
-Peaks that mirror each other (two busts) make pairs: a pattern maker cuts both or none.
+A candidate runs from the border to a place, from border to border, or, where the place is at the border, from there inwards. Places are
+peaks of the energy, or where the cloth does not fit. Peaks that mirror each other (two busts) make pairs: a pattern maker cuts both or
+none. What a candidate would do is foretold by a crack in the laid piece (`warpflat.flat.cutting.crack`), so that few have to be tried.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from itertools import combinations, pairwise
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.arrays import BoolArray, IntArray
 from warpflat.core.errors import InputError
-from warpflat.core.polyline import points_at_lengths
+from warpflat.core.polyline import polyline_length
+from warpflat.flat.cutting.crack import LaidCloth, Price
 from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.surface.curvature import curvature_tensors
-from warpflat.flat.surface.energy_map import EnergyMap, energy_map, energy_peak, smooth_to_vertices
-from warpflat.flat.surface.half_edges import border_edges, edge_faces
+from warpflat.flat.surface.energy_map import place_in_words, smooth_to_vertices
+from warpflat.flat.surface.half_edges import border_edges
 from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.paths.edge_paths import EdgeGraph, path_length
+from warpflat.flat.surface.paths.edge_paths import path_length
 from warpflat.flat.surface.paths.geodesic import distance_from
 from warpflat.flat.surface.paths.trace import SurfacePath, polyline_path
 
-__all__ = ["Candidate", "Peaks", "find_candidates", "find_peaks"]
+__all__ = ["Candidate", "find_candidates", "find_peaks", "peaks_in_words"]
+
+Ids = NDArray[np.int64]
 
 
 # Lengths are shares of the piece's diagonal.
@@ -33,18 +39,15 @@ _SMOOTHING = 0.02
 _APART = 0.15
 _REACH = 0.12
 _SHORTEST = 0.04
-_STRAY = 0.01
 # A peak counts from this share of the highest peak's density.
 _NEARLY_AS_HIGH = 0.7
 _MOST_PEAKS = 4
 # Two cuts whose lengths agree to this share mirror each other.
 _ALIKE = 0.03
-# A cut from a peak at the border ends after such shares of the way inwards.
+# A cut from a place at the border ends after such shares of the way to the middle of the cloth.
 _INWARDS = {"inward": 0.8, "short inward": 0.4}
 # A piece whose edges are all within this share of their lengths is flat but for rounding.
 _FREE_OF_STRAIN = 1e-6
-# A free path costs this many times more where there is no energy than at the peak.
-_COST_RATIO = 20.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,119 +56,100 @@ class Candidate:
 
     Attributes:
         name: what it is called.
-        paths: vertices of the uncut surface along its edges, from the border inwards; empty if the path must be worked
-            into the mesh first.
-        drawn: paths that need not follow edges.
-        peaks: the numbers of the peaks at which it ends.
+        paths: vertices of the uncut surface along its edges, from the border inwards; of what is drawn those that are nearest.
+        drawn: paths that need not follow edges, to be worked into the mesh first; none if it runs along edges.
+        places: the numbers of the places at which it ends.
+        price: what it would do, without a trial.
+        table: that makes it as one of a scene's `[[cuts]]`; none of a pair.
         has_twin: whether another one mirrors it, so that both are also a pair.
     """
 
     name: str
-    paths: tuple[IntArray, ...] = ()
+    paths: tuple[IntArray, ...]
+    price: Price
     drawn: tuple[SurfacePath, ...] = ()
-    peaks: tuple[int, ...] = ()
+    places: tuple[int, ...] = ()
+    table: Mapping[str, Any] | None = None
     has_twin: bool = False
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Peaks:
-    """Maxima of the energy density inside a piece, away from its border.
-
-    Attributes:
-        map: of the uncut surface, see `warpflat.flat.surface.energy_map`.
-        vertices: of the uncut surface, highest first.
-        words: the place of each.
-    """
-
-    map: EnergyMap
-    vertices: tuple[int, ...]
-    words: tuple[str, ...] = field(default=())
-
-
-def find_peaks(result: Flattening, *, landmarks: Mapping[str, int] | None = None) -> Peaks:
-    """Find the highest points of the smoothed energy density inside a piece.
-
-    Args:
-        result: the flattened piece.
-        landmarks: named vertices of its surface, for the words.
-    """
-    surface = result.surface
-    size = _diagonal(surface)
+def find_peaks(result: Flattening) -> tuple[int, ...]:
+    """Return the vertices of the uncut surface where the smoothed energy density inside a piece peaks, highest first."""
+    surface, size = result.surface, _diagonal(result.surface)
     # On the cut surface energy does not spread across a crack; copies of a vertex are then put together again.
-    apart = energy_map(result.network.surface, result.face_energy_density, smoothing_length=_SMOOTHING * size)
+    apart = smooth_to_vertices(result.network.surface, result.face_energy_density, smoothing_length=_SMOOTHING * size)
     density = np.zeros(len(surface.vertices))
-    np.maximum.at(density, result.vertex_origin, apart.vertex_density)
-    on_border = _border(result)
-    chosen = _highest(surface, np.where(on_border, -1.0, density), apart=_APART * size)
-    whole = energy_map(
-        surface, result.face_energy_density, smoothing_length=_SMOOTHING * size, landmarks=dict(landmarks or {})
-    )
-    spikes = np.zeros((len(chosen), len(surface.vertices)))
-    spikes[np.arange(len(chosen)), chosen] = 1.0
-    words = tuple(energy_peak(surface, spike, landmarks=dict(landmarks or {})).words for spike in spikes)
-    return Peaks(map=whole, vertices=tuple(chosen), words=words)
+    np.maximum.at(density, result.vertex_origin, apart)
+    density[_border(result)] = -1.0
+    chosen: list[int] = []
+    for vertex in np.argsort(-density, kind="stable").tolist():
+        if density[vertex] <= 0 or (chosen and density[vertex] < _NEARLY_AS_HIGH * density[chosen[0]]):
+            break
+        gap = np.linalg.norm(surface.vertices[chosen] - surface.vertices[vertex], axis=1)
+        if len(chosen) < _MOST_PEAKS and gap.min(initial=np.inf) > _APART * size:
+            chosen.append(vertex)
+    return tuple(chosen)
 
 
-def find_candidates(result: Flattening, peaks: Peaks | None = None) -> tuple[Candidate, ...]:
+def find_candidates(result: Flattening, places: Sequence[int] | None = None) -> tuple[Candidate, ...]:
     """Find cuts worth comparing on a flattened piece, cut before or not.
 
-    Each feature line that passes near a peak, from each of its ends on the border to that peak and as a whole; one free
-    path per peak from there to the border; from the border near a peak two ways inwards; and the pairs of those that mirror each other.
+    Each feature line that passes near a place, from each of its ends on the border to there and as a whole; for each place the best of
+    the straight cuts from the border around it, or from the border two ways inwards; and the pairs of those that mirror each other.
+
+    Args:
+        result: the piece.
+        places: vertices of its uncut surface; the peaks of its energy if not given.
 
     Raises:
         InputError: the piece stores no energy away from its border, so there is nowhere to cut to.
     """
-    peaks = peaks or find_peaks(result)
-    if not peaks.vertices or result.layout_measures["length_error"] < _FREE_OF_STRAIN:
+    places = find_peaks(result) if places is None else places
+    if not len(places) or result.layout_measures["length_error"] < _FREE_OF_STRAIN:
         raise InputError(f"piece {result.surface.name!r} stores no strain energy inside: there is nothing to cut for")
-    found: list[Candidate] = []
-    for name, line in result.surface.lines.items():
-        found += _along_line(result, name, np.asarray(line, dtype=np.int32), peaks)
-    for number in range(len(peaks.vertices)):
-        free = _free_path(result, number, peaks)
-        found += [] if free is None else [free]
-        if free is None or _cut_length(result.surface, free) < _REACH * _diagonal(result.surface):
-            found += _cuts_inwards(result, number, peaks)
-    seen: set[tuple[int, ...]] = set()
+    laid = LaidCloth(result.network, result.positions)
+    found: dict[tuple[int, ...], tuple[Candidate, Ids]] = {}
     names: dict[str, int] = {}
-    singles = []
-    for one in found:
-        key = tuple(sorted(v for path in one.paths for v in path.tolist()))
-        if key and key in seen:
+    lines = (
+        one
+        for name, line in result.surface.lines.items()
+        for one in _along_line(result, laid, name, np.asarray(line, dtype=np.int32), places)
+    )
+    straight = (one for number in range(len(places)) for one in _straight(result, laid, number, places))
+    for one, row in (*lines, *straight):
+        key = tuple(sorted(row.tolist()))
+        if key not in found:
+            names[one.name] = names.get(one.name, 0) + 1
+            found[key] = replace(one, name=f"{one.name} ({names[one.name]})") if names[one.name] > 1 else one, row
+    # Pairs of cuts of one length that lead to two places and share no vertex, each pair as one cut, with both names.
+    pairs, size = [], _diagonal(result.surface)
+    for (a, row), (b, other) in combinations(found.values(), 2):
+        if not (a.places and b.places) or set(a.places) & set(b.places) or bool(a.drawn) != bool(b.drawn):
             continue
-        seen.add(key)
-        names[one.name] = names.get(one.name, 0) + 1
-        if names[one.name] > 1:
-            one = Candidate(name=f"{one.name} ({names[one.name]})", paths=one.paths, drawn=one.drawn, peaks=one.peaks)
-        singles.append(one)
-    # Pairs of cuts of one length that lead to two peaks and share no vertex, each pair as one cut, with both names.
-    pairs = []
-    for a, b in combinations(singles, 2):
-        if not (a.peaks and b.peaks) or set(a.peaks) & set(b.peaks) or bool(a.drawn) != bool(b.drawn):
-            continue
-        lengths = _cut_length(result.surface, a), _cut_length(result.surface, b)
-        shared = {int(v) for path in a.paths for v in path} & {int(v) for path in b.paths for v in path}
-        if shared or abs(lengths[0] - lengths[1]) > _ALIKE * max(lengths):
-            continue
-        # Two cuts that mirror each other have ends at equal distances across.
-        (begin, tip), (other_begin, other_tip) = (
-            result.surface.vertices[one.paths[0][[0, -1]]] if one.paths else one.drawn[0].points[[0, -1]]
-            for one in (a, b)
-        )
+        # Two cuts that mirror each other are as long and have ends at equal distances across.
+        (begin, tip), (other_begin, other_tip) = (result.surface.vertices[one.paths[0][[0, -1]]] for one in (a, b))
         across = np.linalg.norm(begin - other_tip) - np.linalg.norm(tip - other_begin)
-        if abs(across) > _ALIKE * _diagonal(result.surface):
+        lengths = [_cut_length(result.surface, one) for one in (a, b)]
+        alike = abs(lengths[0] - lengths[1]) <= _ALIKE * max(lengths) and abs(across) <= _ALIKE * size
+        if not alike or np.isin(row, other).any():
             continue
         along = a.name.rpartition(" from ")[0]
         same = along and b.name.startswith(f"{along} from ")
         both = Candidate(
             name=f"{a.name} and {b.name.removeprefix(along + ' from ')}" if same else f"{a.name} + {b.name}",
             paths=a.paths + b.paths,
+            price=laid.price([row, other]),
             drawn=a.drawn + b.drawn,
-            peaks=tuple(sorted({*a.peaks, *b.peaks})),
+            places=tuple(sorted({*a.places, *b.places})),
         )
         pairs.append((both, (a.name, b.name)))
     twins = {name for pair in pairs for name in pair[1]}
-    return (*(pair for pair, _ in pairs), *(replace(one, has_twin=one.name in twins) for one in singles))
+    return (*(pair for pair, _ in pairs), *(replace(one, has_twin=one.name in twins) for one, _ in found.values()))
+
+
+def peaks_in_words(result: Flattening) -> tuple[str, ...]:
+    """Return the places of the peaks of a piece's energy as sentences, highest first."""
+    return tuple(place_in_words(result.surface, vertex) for vertex in find_peaks(result))
 
 
 def _diagonal(surface: Surface) -> float:
@@ -180,162 +164,109 @@ def _border(result: Flattening) -> BoolArray:
     return flags
 
 
-def _along_line(result: Flattening, name: str, line: IntArray, peaks: Peaks) -> list[Candidate]:
-    """Return the parts of an uncut line from the border to the peaks near it, and the whole line."""
+def _along_line(
+    result: Flattening, laid: LaidCloth, name: str, line: IntArray, places: Sequence[int]
+) -> Iterator[tuple[Candidate, Ids]]:
+    """Yield the parts of an uncut line from the border to the places near it, and the whole line, with their rows in the layout."""
     surface, size = result.surface, _diagonal(result.surface)
     on_border = _border(result)
     rim = {int(v) for v in border_edges(surface.faces).ravel()}
     if line[0] == line[-1] or np.count_nonzero(on_border[line[1:-1]]) > 0.5 * (len(line) - 2):
-        return []
+        return
     points = surface.vertices[line]
-    found: list[Candidate] = []
-    passes_peak = False
-    for number, peak in enumerate(peaks.vertices):
-        distance = np.linalg.norm(points - surface.vertices[peak], axis=1)
+
+    def priced(
+        title: str, path: IntArray, part: Sequence[float] = (), places: tuple[int, ...] = ()
+    ) -> Iterator[tuple[Candidate, Ids]]:
+        row = laid.row_of(result.vertex_origin, path)
+        if row is not None:
+            table = {"line": name} | ({"part": list(part)} if part else {})
+            yield Candidate(name=title, paths=(path,), price=laid.price([row]), places=places, table=table), row
+
+    passes = False
+    for number, place in enumerate(places):
+        distance = np.linalg.norm(points - surface.vertices[place], axis=1)
         station = int(np.argmin(distance))
         if distance[station] > _REACH * size or on_border[line[station]]:
             continue
-        passes_peak = True
+        passes = True
         for part, end in ((line[: station + 1], "its start"), (line[station:][::-1], "its end")):
-            # The cut begins at the vertex of a border or a crack that is nearest to the peak.
+            # The cut begins at the vertex of a border or a crack that is nearest to the place.
             outwards = np.flatnonzero(on_border[part[::-1]])
             if not len(outwards):
                 continue
-            path = part[len(part) - 1 - int(outwards[0]) :]
-            if path_length(surface, [path]) <= _SHORTEST * size or not _is_free(result, path):
+            row = part[len(part) - 1 - int(outwards[0]) :]
+            if path_length(surface, [row]) <= _SHORTEST * size:
                 continue
-            others = [other for k, other in enumerate(peaks.vertices) if k != number]
-            if any(_distance(surface, path, other) < _REACH * size for other in others):
-                # It would run through another peak to this one; the part up to that is a candidate of its own.
+            others = [other for k, other in enumerate(places) if k != number]
+            if any(_distance(surface, row, other) < _REACH * size for other in others):
+                # It would run through another place to this one; the part up to that is a candidate of its own.
                 continue
             # It is named after the border line that it begins on.
             begins = (
                 border
-                for border, row in surface.lines.items()
-                if border != name and path[0] in row and all(int(v) in rim for v in row)
+                for border, along in surface.lines.items()
+                if border != name and row[0] in along and all(int(v) in rim for v in along)
             )
-            found.append(Candidate(name=f"{name} from {next(begins, end)}", paths=(path,), peaks=(number,)))
-    crosses = on_border[line[[0, -1]]].all() and not on_border[line[1:-1]].any()
-    if passes_peak and crosses and _is_free(result, line):
-        found.append(Candidate(name=f"{name}, whole", paths=(line,)))
-    return found
+            whole = polyline_length(points)
+            first, last = (
+                polyline_length(points[: int(np.flatnonzero(line == v)[0]) + 1]) / whole for v in row[[0, -1]]
+            )
+            yield from priced(f"{name} from {next(begins, end)}", row, (round(first, 4), round(last, 4)), (number,))
+    if passes and on_border[line[[0, -1]]].all():
+        yield from priced(f"{name}, whole", line)
 
 
 def _distance(surface: Surface, path: IntArray, vertex: int) -> float:
     return float(np.linalg.norm(surface.vertices[path] - surface.vertices[vertex], axis=1).min())
 
 
-def _is_free(result: Flattening, path: IntArray) -> bool:
-    """Return whether a path has cloth on both sides and touches earlier cuts at its ends only."""
-    taken = {int(v) for made in result.cuts for other in made.paths for v in other}
-    edges, beside = edge_faces(result.surface.faces)
-    inside = {(int(a), int(b)) for (a, b), faces in zip(edges, beside, strict=True) if faces[1] >= 0}
-    steps = {(min(a, b), max(a, b)) for a, b in pairwise(path.tolist())}
-    return steps <= inside and not taken & set(path[1:-1].tolist())
+def _straight(
+    result: Flattening, laid: LaidCloth, number: int, places: Sequence[int]
+) -> Iterator[tuple[Candidate, Ids]]:
+    """Yield straight cuts to a place, with their rows in the layout: that from the border around it which releases most for its length.
 
-
-def _free_path(result: Flattening, number: int, peaks: Peaks) -> Candidate | None:
-    """Return the path from the border to a peak that follows the energy (Wang, Smith and Yuen 2002); None if there is none.
-
-    A stretch of edge costs its length, less where much energy lies along it. On triangles, whose edges lead nowhere in
-    particular, the path is then drawn as straight as the surface allows.
+    Of a place near the border two lead from there inwards.
     """
-    from scipy.sparse.csgraph import dijkstra
+    surface, size, flat = result.surface, _diagonal(result.surface), laid.positions
+    quads = bool(surface.is_quad.all())
+    place = int(np.flatnonzero(result.vertex_origin == places[number])[0])
 
-    cut_surface = result.network.surface
-    peak = peaks.vertices[number]
-    graph = EdgeGraph(cut_surface)
-    density = peaks.map.vertex_density[result.vertex_origin]
-    along = density[graph.edges].mean(axis=1) / max(float(density.max()), np.finfo(float).tiny)
-    matrix = graph.matrix(graph.length / (1.0 / _COST_RATIO + (1.0 - 1.0 / _COST_RATIO) * along))
-    cost, before = dijkstra(matrix, indices=peak, return_predecessors=True)
-    rim = np.unique(border_edges(cut_surface.faces))
-    goal = int(rim[np.argmin(cost[rim])])
-    if not np.isfinite(cost[goal]):
-        return None
-    chain = [goal]
-    while chain[-1] != peak:
-        chain.append(int(before[chain[-1]]))
-    path = result.vertex_origin[np.array(chain)]
-    # Everything before the last vertex of the border would run along it.
-    last = int(np.flatnonzero(np.isin(chain, rim)).max())
-    path = path[last:]
-    surface = result.surface
-    if len(path) < 2 or path_length(surface, [path]) < _SHORTEST * _diagonal(surface) or not _is_free(result, path):
-        return None
-    name = f"free path {_last_number(result, 'free path') + number + 1}"
-    if surface.is_quad.all():
-        return Candidate(name=name, paths=(path,), peaks=(number,))
-    stops = _corners(surface.vertices[path], _STRAY * _diagonal(surface))
-    try:
-        drawn = polyline_path(surface, [int(path[k]) for k in stops])
-    except InputError:
-        return Candidate(name=name, paths=(path,), peaks=(number,))
-    return Candidate(name=name, drawn=(drawn,), peaks=(number,))
+    def priced(title: str, row: Ids | None) -> Iterator[tuple[Candidate, Ids]]:
+        if row is None or path_length(surface, [path := result.vertex_origin[row]]) <= _SHORTEST * size:
+            return
+        drawn: tuple[SurfacePath, ...] = ()
+        if not quads:
+            # On triangles, whose edges lead nowhere in particular, it is drawn.
+            with suppress(InputError):
+                drawn = (polyline_path(surface, path[[0, -1]].tolist()),)
+        ends = [[round(x, 5) for x in surface.vertices[end].tolist()] for end in path[[0, -1]]]
+        table = dict(zip(("from", "to"), ends, strict=True))
+        cost = laid.price([row])
+        yield Candidate(name=title, paths=(path,), price=cost, drawn=drawn, places=(number,), table=table), row
 
-
-def _cuts_inwards(result: Flattening, number: int, peaks: Peaks) -> list[Candidate]:
-    """Return straight cuts from the border near a peak towards the curved part of the piece.
-
-    The cloth along a border is too long or too short because of the curvature behind it; that is what a cut has to reach.
-    """
-    surface, size = result.surface, _diagonal(result.surface)
-    outside = np.unique(border_edges(surface.faces))
-    start = int(
-        outside[np.argmin(np.linalg.norm(surface.vertices[outside] - surface.vertices[peaks.vertices[number]], axis=1))]
-    )
-    made = [path for one in result.cuts for path in one.paths]
-    if any(_distance(surface, path, start) < _REACH * size for path in made):
-        # It would leave a strip between itself and that cut.
-        return []
-    # The curved part: where the Gaussian curvature times the distance to the border peaks.
-    tensor = curvature_tensors(surface)
-    trace = np.trace(tensor, axis1=1, axis2=2)
-    gauss = np.abs(0.5 * (trace**2 - np.einsum("vij,vji->v", tensor, tensor)))
-    used = surface.faces >= 0
-    of_faces = np.where(used, gauss[surface.faces], 0.0).sum(axis=1) / used.sum(axis=1)
-    value = smooth_to_vertices(surface, of_faces, smoothing_length=2 * _SMOOTHING * size) * distance_from(
-        surface, outside
-    )
-    # Only what is higher than its neighbours, not what lies high on the flank of a peak.
-    a, b = EdgeGraph(surface).edges.T
-    is_peak = np.ones(len(value), dtype=bool)
-    is_peak[a[value[a] < value[b]]] = is_peak[b[value[b] < value[a]]] = False
-    curved = _highest(surface, np.where(is_peak, value, 0.0), apart=_APART * size)
-    if not curved:
-        return []
-    nearest = np.argmin(np.linalg.norm(surface.vertices[curved] - surface.vertices[start], axis=1))
-    found = []
+    if not laid.border[place]:
+        rows = [laid.dart(mouth, place) for mouth in dict.fromkeys(laid.mouths(place))]
+        around = [
+            one for row in rows for one in priced(f"free path {_last_number(result, 'free path') + number + 1}", row)
+        ]
+        # Sheared quads give way along their diagonals, which a crack in the membrane does not know: of theirs the shortest.
+        yield from sorted(around, key=lambda one: one[0].price.length if quads else -one[0].price.per_metre)[:1]
+    rim = np.flatnonzero(laid.border & np.isin(result.vertex_origin, border_edges(surface.faces)))
+    start = int(rim[np.linalg.norm(flat[rim] - flat[place], axis=1).argmin()])
+    made = (path for one in result.cuts for path in one.paths)
+    if np.linalg.norm(flat[start] - flat[place]) > _REACH * size or any(
+        _distance(surface, path, int(result.vertex_origin[start])) < _REACH * size for path in made
+    ):
+        # Beside an earlier cut it would leave a strip.
+        return
+    # The cloth along a border is too long or too short because of what lies behind it: that is what a cut has to reach.
+    inner = np.flatnonzero(~laid.border)
+    middle = inner[distance_from(surface, np.unique(border_edges(surface.faces)))[result.vertex_origin[inner]].argmax()]
     for kind, share in _INWARDS.items():
-        try:
-            whole = polyline_path(surface, [start, curved[nearest]])
-            point = points_at_lengths(whole.points, share * whole.length)
-            tip = int(np.argmin(np.linalg.norm(surface.vertices - point, axis=1)))
-            drawn = polyline_path(surface, [start, tip])
-        except InputError:
-            continue
-        if drawn.length > _SHORTEST * size:
-            name = f"{kind} {_last_number(result, 'inward') + number + 1}"
-            found.append(Candidate(name=name, drawn=(drawn,), peaks=(number,)))
-    return found
-
-
-def _highest(surface: Surface, height: FloatArray, *, apart: float) -> list[int]:
-    """Return the vertices where a positive value peaks, highest first.
-
-    Args:
-        surface: with #V vertices.
-        height: #V, the value.
-        apart: least distance between two of them [m].
-    """
-    chosen: list[int] = []
-    for vertex in np.argsort(-height, kind="stable").tolist():
-        if height[vertex] <= 0 or (chosen and height[vertex] < _NEARLY_AS_HIGH * height[chosen[0]]):
-            break
-        gap = [float(np.linalg.norm(surface.vertices[vertex] - surface.vertices[other])) for other in chosen]
-        if len(chosen) < _MOST_PEAKS and min(gap, default=np.inf) > apart:
-            chosen.append(vertex)
-    return chosen
+        aim = (1.0 - share) * flat[start] + share * flat[middle]
+        tip = int(inner[np.linalg.norm(flat[inner] - aim, axis=1).argmin()])
+        yield from priced(f"{kind} {_last_number(result, 'inward') + number + 1}", laid.dart(start, tip))
 
 
 def _last_number(result: Flattening, kind: str) -> int:
@@ -344,23 +275,5 @@ def _last_number(result: Flattening, kind: str) -> int:
     return max((int(found) for found in re.findall(rf"\b{kind} (\d+)", names)), default=0)
 
 
-def _corners(points: FloatArray, stray: float) -> list[int]:
-    """Return the points of a polyline that a simpler one needs to stay within a distance of it (Ramer 1972)."""
-    kept = {0, len(points) - 1}
-    open_parts = [(0, len(points) - 1)]
-    while open_parts:
-        a, b = open_parts.pop()
-        if b - a < 2:
-            continue
-        chord = points[b] - points[a]
-        length = max(float(np.linalg.norm(chord)), np.finfo(float).tiny)
-        off = np.linalg.norm(np.cross(points[a + 1 : b] - points[a], chord / length), axis=1)
-        if off.max() > stray:
-            middle = a + 1 + int(np.argmax(off))
-            kept.add(middle)
-            open_parts += [(a, middle), (middle, b)]
-    return sorted(kept)
-
-
 def _cut_length(surface: Surface, one: Candidate) -> float:
-    return path_length(surface, one.paths) + sum(path.length for path in one.drawn)
+    return sum(path.length for path in one.drawn) or path_length(surface, one.paths)

@@ -15,7 +15,7 @@ chain. In this model they may lie over each other, too. Their opening is negativ
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -25,7 +25,7 @@ from scipy.linalg import null_space
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import arc_lengths
 from warpflat.core.vectors import turned_left, unit
 from warpflat.flat.model.network import SpringNetwork
@@ -34,7 +34,7 @@ from warpflat.flat.solver.metric import StiffnessFactor, cell_forces, cell_stiff
 from warpflat.flat.surface.connectivity import border_of, join_labels
 from warpflat.flat.surface.half_edges import half_edges_of, opposite_half_edges
 
-__all__ = ["ElasticCrack", "LaidCloth", "Parted"]
+__all__ = ["ElasticCrack", "LaidCloth", "Parted", "Price"]
 
 Ids = NDArray[np.int64]
 
@@ -42,8 +42,12 @@ Ids = NDArray[np.int64]
 _NODES = 10
 # Strains of a displacement are the difference of those of this share of it to either side.
 _STEP = 1e-3
+# The sides of what opens lie over each other by no more than this [m], or than this share of its opening.
+_OVER, _OVER_SHARE = 1e-3, 0.05
 # How much dearer a path is that strays from its line by its edges' mean length, and one that touches a border.
 _STRAY, _AT_BORDER = 3.0, 1e3
+# Mouths of darts are looked for in so many directions. A dart so much longer than its tip is away from the border leaves a flap.
+_DIRECTIONS, _FLAP = 12, 2.0
 # What holds an opening that nothing resists, as a share of the mean stiffness of all.
 _HELD = 1e-6
 
@@ -61,6 +65,30 @@ class Parted:
     released: float
     openings: list[FloatArray]
     turned: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Price:
+    """What a cut would do, without a trial.
+
+    Attributes:
+        released: strain energy [J].
+        relieved: cloth that comes back within its limits, less what leaves them [m2].
+        length: of all its rows [m].
+        opening: the widest gap between its sides [m].
+        opens: whether it does, rather than that its sides lie over each other; what parts the piece is laid apart.
+    """
+
+    released: float
+    relieved: float
+    length: float
+    opening: float
+    opens: bool
+
+    @property
+    def per_metre(self) -> float:
+        """Strain energy released for its length [J/m]."""
+        return self.released / max(self.length, np.finfo(float).tiny)
 
 
 class LaidCloth:
@@ -89,7 +117,7 @@ class LaidCloth:
         cells, part = network.cell_arrays, network.cell_models[0]
         self.corner = cells.corner
         self.stiffness = cell_stiffness(network, self.positions, part)
-        self.solve = StiffnessFactor(network, self.positions).solve
+        self.solve = StiffnessFactor(network, self.positions, cells=self.stiffness).solve
         self.force = cell_forces(network, self.positions, part)
         used = cells.faces >= 0
         pull = np.zeros_like(self.positions)
@@ -136,6 +164,56 @@ class LaidCloth:
                 return None
             found.append(int(before[found[-1]]))
         return None if rim[found].any() else np.array(found[::-1])
+
+    def row_of(self, origin: IntArray, path: IntArray) -> Ids | None:
+        """Return a path as vertices of the layout, in which cuts have doubled some; None if it touches the border on its way.
+
+        Args:
+            origin: #V, for each vertex of the layout what the path calls it.
+            path: along edges, from border to border or to a place inside.
+        """
+        order, edges = np.argsort(origin, kind="stable"), self.half_edges.edges
+        inner = order[np.searchsorted(origin, path[1:-1], sorter=order)]
+        if len(inner) == 0 or self.border[inner].any():
+            return None
+        # Of the copies of an end the one beside the path.
+        first, last = (
+            np.intersect1d(np.flatnonzero(origin == end), edges[(edges == beside).any(axis=1)])[:1]
+            for end, beside in ((path[0], inner[0]), (path[-1], inner[-1]))
+        )
+        return np.concatenate([first, inner, last]).astype(np.int64)
+
+    def price(self, rows: Sequence[Ids]) -> Price:
+        """Return what a cut along rows of vertices would do, such as a row and its mirror image."""
+        crack = ElasticCrack(self, rows)
+        parted = crack.part([(0, len(at) - 1) for at in crack.at])
+        widest = max(float(opening.max()) for opening in parted.openings)
+        over = max(-float(opening.min()) for opening in parted.openings)
+        return Price(
+            released=parted.released,
+            relieved=crack.relieved(parted),
+            length=sum(float(at[-1]) for at in crack.at),
+            opening=widest,
+            opens=all(self.border[row[[0, -1]]].all() for row in rows) or over <= max(_OVER, _OVER_SHARE * widest),
+        )
+
+    def dart(self, mouth: int, tip: int) -> Ids | None:
+        """Return the vertices of a straight dart in the layout; None if it meets the border, or runs along it and would leave a flap."""
+        way, points = self.positions[tip] - self.positions[mouth], self.positions
+        if np.linalg.norm(way) >= _FLAP * np.linalg.norm(points[self.border] - points[tip], axis=1).min():
+            return None
+        along = unit(way)
+        return self.row(mouth, tip, np.abs((points - points[mouth]) @ [along[1], -along[0]]))
+
+    def mouths(self, tip: int) -> Iterator[int]:
+        """Yield the vertices of the border from which darts could run to a tip inside: in each of twelve directions the nearest."""
+        rim = np.flatnonzero(self.border)
+        ways = self.positions[rim] - self.positions[tip]
+        far = np.linalg.norm(ways, axis=1)
+        for angle in np.arange(_DIRECTIONS) * 2.0 * np.pi / _DIRECTIONS:
+            seen = np.flatnonzero(ways @ [np.sin(angle), np.cos(angle)] > np.cos(np.pi / _DIRECTIONS) * far)
+            if len(seen):
+                yield int(rim[seen[far[seen].argmin()]])
 
     def sides(self, row: Ids) -> tuple[Ids, Ids]:
         """Return the corners of faces on the right of a row: the half-edge that begins in each, and its vertex's place in the row.

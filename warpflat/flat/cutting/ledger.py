@@ -1,10 +1,10 @@
-"""The ledger of cuts: the model energy that each candidate would release, in all and per centimetre."""
+"""The ledger of cuts: what those that promise most would release, in all and per centimetre, each on trial."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -14,14 +14,14 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.core.short_repr import short_repr
-from warpflat.flat.cutting.candidates import Candidate, find_candidates, find_peaks
+from warpflat.flat.cutting.candidates import Candidate, find_candidates, peaks_in_words
+from warpflat.flat.cutting.crack import Price
 from warpflat.flat.cutting.cut_piece import cut
 from warpflat.flat.cutting.cut_plan import CutPlan
 from warpflat.flat.cutting.refine_piece import refine_along
 from warpflat.flat.flattening.edit import relax_cut
-from warpflat.flat.flattening.progress import Progress
 from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.solver.options import RelaxOptions, coarse_options, given_options
+from warpflat.flat.solver.options import RelaxOptions, coarse_options
 from warpflat.flat.surface.cut.dart import dart_measure, fish_eye_measure
 
 __all__ = [
@@ -29,14 +29,16 @@ __all__ = [
     "Ledger",
     "LedgerEntry",
     "RankedBy",
+    "best_of_few",
     "cut_automatically",
     "evaluate",
     "make_ledger",
-    "try_all",
 ]
 
 RankedBy = Literal["per_cm", "released"]
 
+# So many cuts are tried for a ledger, and so many for a choice.
+_LISTED, _TRIED = 8, 3
 # A dart that takes in less is not sewn but eased in [m].
 _LEAST_MOUTH = 5e-3
 
@@ -240,17 +242,35 @@ class Ledger:
 Cut = TypeVar("Cut")
 
 
-def try_all(
-    cuts: Sequence[Cut], name_of: Callable[[Cut], str], evaluate: Callable[[Cut], LedgerEntry], *, by: RankedBy
+def best_of_few(
+    cuts: Sequence[tuple[str, Price, Cut]],
+    evaluate: Callable[[Cut], LedgerEntry],
+    *,
+    by: RankedBy,
+    listed: bool = True,
 ) -> tuple[tuple[LedgerEntry, ...], tuple[tuple[str, str], ...]]:
-    """Try cuts one after the other; return what each would do, the best first, and those that are refused, and why."""
+    """Try the cuts that promise most; return what each would do, the best first, and those that are refused, and why.
+
+    Args:
+        cuts: the name and the price of each.
+        evaluate: tries one.
+        by: what the order goes by: energy released per centimetre cut, or in all.
+        listed: eight are tried, to be compared; else three, of which one is chosen.
+    """
+    most = _LISTED if listed else _TRIED
+
+    def promise(cost: Price) -> tuple[bool, float]:
+        return not cost.opens, -(cost.per_metre if by == "per_cm" else cost.released)
+
     entries, refused = list[LedgerEntry](), list[tuple[str, str]]()
-    for number, one in enumerate(cuts, 1):
-        report_activity(f"cut {number} of {len(cuts)}, {name_of(one)}")
+    for name, _, one in sorted(cuts, key=lambda cut: promise(cut[1])):
+        report_activity(f"cut {len(entries) + 1} of {min(most, len(cuts))}, {name}")
         try:
             entries.append(evaluate(one))
         except InputError as reason:
-            refused.append((name_of(one), str(reason)))
+            refused.append((name, str(reason)))
+        if len(entries) == most:
+            break
     entries.sort(key=lambda entry: (not entry.can_be_sewn, -getattr(entry, by)))
     return tuple(entries), tuple(refused)
 
@@ -261,32 +281,33 @@ def make_ledger(
     relax: RelaxOptions | None = None,
     by: RankedBy = "per_cm",
     candidates: Sequence[Candidate] | None = None,
+    listed: bool = True,
 ) -> Ledger:
-    """Try all candidates on a flattened piece, each coarsely, and rank them.
+    """Try the candidates on a flattened piece that promise most, each coarsely, and rank them.
 
     Args:
         result: the piece, cut before or not.
         relax: options of the full relaxation, from which the coarse ones follow.
         by: what the order goes by: energy released per centimetre cut, or in all.
         candidates: to compare; those of :func:`warpflat.flat.cutting.candidates.find_candidates` if not given.
+        listed: see :func:`best_of_few`.
 
     Raises:
         InputError: there is nothing to cut for, or no candidate can be made.
     """
-    peaks = find_peaks(result)
-    chosen = find_candidates(result, peaks) if candidates is None else candidates
+    words = peaks_in_words(result)
+    chosen = find_candidates(result) if candidates is None else candidates
     coarse = coarse_options(relax)
-    entries, refused = try_all(chosen, lambda one: one.name, lambda one: evaluate(result, one, relax=coarse), by=by)
+    cuts = [(one.name, one.price, one) for one in chosen]
+    entries, refused = best_of_few(cuts, lambda one: evaluate(result, one, relax=coarse), by=by, listed=listed)
     if not entries:
         why = (
             f"{refused[0][0]}: {refused[0][1]}" if refused
-            else f"none passes near the peak of its energy ({peaks.words[0]}), and no way of any length leads there or inwards from "
+            else f"none passes near the peak of its energy ({words[0]}), and no way of any length leads there or inwards from "
             "the border; draw a line through it"
         )  # fmt: skip
         raise InputError(f"piece {result.surface.name!r} has no line to cut along: {why}")
-    return Ledger(
-        name=result.surface.name, pieces=(result,), peaks=tuple(peaks.words), entries=entries, refused=refused
-    )
+    return Ledger(name=result.surface.name, pieces=(result,), peaks=words, entries=entries, refused=refused)
 
 
 def evaluate(result: Flattening, candidate: Candidate, *, relax: RelaxOptions) -> LedgerEntry:
@@ -295,7 +316,7 @@ def evaluate(result: Flattening, candidate: Candidate, *, relax: RelaxOptions) -
     Raises:
         InputError: the cut is refused; see :func:`warpflat.flat.cutting.cut_piece.cut`.
     """
-    before, paths = result, list(candidate.paths)
+    before, paths = result, list(candidate.paths if not candidate.drawn else ())
     names = [
         candidate.name if number == 0 else f"{candidate.name} {number + 1}" for number in range(len(candidate.drawn))
     ]
@@ -350,52 +371,31 @@ def worn_strain_level(result: Flattening) -> float:
 
 
 def cut_automatically(
-    result: Flattening,
-    auto: AutoCut,
-    *,
-    relax: RelaxOptions | None = None,
-    callback: Callable[[Progress], bool | None] | None = None,
-    fully: bool = True,
+    result: Flattening, auto: AutoCut, *, relax: RelaxOptions | None = None
 ) -> tuple[Flattening, tuple[Ledger, ...]]:
-    """Cut greedily: try all candidates, make the best that does not overlap, relax, and again until it is enough.
+    """Cut greedily: try the candidates that promise most, make the best that does not overlap, and again until it is enough.
 
     Args:
         result: the flattened piece.
         auto: when to stop.
-        relax: options of the relaxation.
-        callback: called as by :func:`warpflat.flat.cutting.cut_piece.cut`.
-        fully: relax the chosen cuts fully; False goes on from the coarse trials, for planning.
+        relax: options of the full relaxation, from which the coarse ones of the trials follow.
 
     Returns:
-        The piece, and the ledger of each round.
+        The piece as the last trial left it, and the ledger of each round.
     """
     ledgers: list[Ledger] = []
-    for _ in range(auto.max_cuts):
-        if auto.is_enough(result):
-            break
+    while len(ledgers) < auto.max_cuts and not auto.is_enough(result):
         try:
             # Of two cuts that mirror each other, both are made or none.
             candidates = [one for one in find_candidates(result) if not one.has_twin]
-            ledger = make_ledger(result, relax=relax, by=auto.by, candidates=candidates)
+            ledger = make_ledger(result, relax=relax, by=auto.by, candidates=candidates, listed=False)
         except InputError:
             if not ledgers:
                 raise
             break
         best = next((entry for entry in ledger.entries if not entry.overlaps), None)
-        if best is None or best.released <= 0 or best.flipped_faces:
+        if best is None or best.result is None or best.released <= 0 or best.flipped_faces:
             break
         ledgers.append(ledger)
-        tried = best.result
-        assert tried is not None
-        if fully:
-            tried = relax_cut(
-                replace(tried, stages=tried.stages[:-1], history=result.history),
-                tried.network.surface,
-                tried.positions,
-                stage=tried.stages[-1].name,
-                cuts=tried.cuts,
-                options=given_options(relax),
-                callback=callback,
-            )
-        result = tried
+        result = best.result
     return result, tuple(ledgers)

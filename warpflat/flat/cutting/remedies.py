@@ -1,49 +1,47 @@
-"""Remedies: cuts that would help where a garment does not fit, or would lie over itself, each tried on its piece."""
+"""Remedies: cuts that would help where a garment does not fit, or would lie over itself."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, polyline_length
+from warpflat.flat.cutting.candidates import find_candidates
 from warpflat.flat.cutting.cut_piece import cut
 from warpflat.flat.cutting.cut_plan import CutPlan
+from warpflat.flat.cutting.ledger import evaluate
 from warpflat.flat.flattening.fit_report import Remedy
 from warpflat.flat.flattening.progress import CONTACT
 from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.model.fit import Misfit, WornFit, assess_fit
+from warpflat.flat.model.fit import WornFit
 from warpflat.flat.solver.contact import Barrier
+from warpflat.flat.solver.options import coarse_options
 from warpflat.flat.surface.connectivity import border_of
 from warpflat.flat.surface.half_edges import half_edges_of
 from warpflat.flat.surface.injective import border_edges_of
-from warpflat.flat.surface.paths.lines import line_between
 
 __all__ = ["advise", "contact_note", "cut_between_contacts", "remedies"]
 
-# A line that passes within this distance of the place can take the dart for it [m].
-_NEARBY = 0.03
-# So many cuts are tried, and so many kept.
-_MOST_TRIALS, _KEPT = 8, 3
+# Cuts to so many places are priced, and so many are named.
+_PLACES, _KEPT = 4, 3
 # Nobody sews a dart shorter than this [m].
 _LEAST_CUT = 0.025
-# Tolerances of a trial are looser by this factor: what it is asked for settles long before the energy.
-_TRIAL_TOLERANCE = 20.0
+# A cut helps that leaves no more than this share of what was beyond the limits.
+_HELPS = 0.9
 
 
 def advise(result: Flattening) -> Flattening:
     """Look for cuts that would help where a piece does not fit, and return the piece with them in `remedies`.
 
-    Where a way of wearing was asked for, up to eight cuts are made and relaxed on trial, and the best three are kept. Otherwise
-    the three nearest are named and none is tried. A note names the cut that would spare the piece a contact that costs much.
+    Of darts and seams to the worst places the three are named that promise to bring most cloth back within its limits. Where a way of
+    wearing was asked for, each of them is made and relaxed on trial, and those that help are kept. A note names the cut that would spare
+    the piece a contact that costs much.
     """
     note = contact_note(result)
     if note is not None:
@@ -53,100 +51,45 @@ def advise(result: Flattening) -> Flattening:
 
 
 def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Remedy]:
-    """Find darts and seams for the worst places: along lines that pass by, and straight from the border.
+    """Find the darts and seams to the worst places that promise most.
 
     A piece that fits unsewn gets none. Cuts of a sewn piece are tried on the unsewn piece and compared with it.
 
     Args:
         result: a flattened piece.
         fit: how it sits.
-        trial: make each cut, relax, and keep those that help, best first; else all of them, nearest first.
+        trial: make each cut, relax, and keep those that help, best first; else all of them, by what they promise for their length.
     """
     unsewn = result.unsewn or result
     if fit.within_limits or unsewn.fit.within_limits:
         return []
-    found: list[Remedy] = []
-    # One by one, since a path over a large mesh takes a while.
-    paths = (remedy for misfit in fit.held_regions[:4] for remedy in _candidates(result, misfit))
-    while len(found) < (_MOST_TRIALS if trial else _KEPT) and (remedy := next(paths, None)) is not None:
-        known = any(np.array_equal(remedy.path, other.path) for other in found)
-        if not known and remedy.length >= _LEAST_CUT:
-            found.append(remedy)
-    if not trial:
-        return found
-    options = unsewn.options
-    quick = replace(
-        options,
-        energy_tolerance=min(_TRIAL_TOLERANCE * options.energy_tolerance, 1.0),
-        residual_tolerance=_TRIAL_TOLERANCE * options.residual_tolerance,
-        max_steps=min(options.max_steps, unsewn.stages[-1].steps + 2000),
-        gap_mm=0.0,
-    )
-    helpful = []
-    for remedy in found:
-        # A path that meets a cut which was made before is refused.
-        with suppress(InputError):
-            opened = cut(unsewn, CutPlan(name="trial", paths=(remedy.path,)), relax=quick)
-            outside = assess_fit(opened.network, opened.positions).outside
-            if outside < 0.9 * unsewn.fit.outside:
-                helpful.append((outside, replace(remedy, outside=outside)))
-    return [remedy for _, remedy in sorted(helpful, key=lambda tried: tried[0])[:_KEPT]]
-
-
-def _candidates(result: Flattening, misfit: Misfit) -> Iterator[Remedy]:
-    """Yield darts and seams along the feature lines that pass near the place that relieves a misfit, then darts from the border to it."""
-    border, points = border_of(result.surface), result.surface.vertices
-    worst = int(result.vertex_origin[misfit.relieved_at])
-    for name, line in result.surface.lines.items():
-        row = np.asarray(line)
-        if len(row) < 2 or np.isin(row, border).all():
-            continue
-        nearest = int(np.argmin(np.linalg.norm(points[row] - points[worst], axis=1)))
-        if np.linalg.norm(points[row[nearest]] - points[worst]) > _NEARBY:
-            continue
-        dart = min(row[: nearest + 1], row[nearest:][::-1], key=len)
-        if len(dart) > 2 and dart[0] in border and not np.isin(dart[1:], border).any():
-            # The shares of the line's length between which it lies, from its mouth.
-            share = polyline_length(points[dart]) / polyline_length(points[row])
-            part = [0.0, round(share, 4)] if dart[0] == row[0] else [1.0, round(1.0 - share, 4)]
-            yield _remedy(result, dart, f"a dart along {name}", {"line": name, "part": part})
-        if row[0] in border and row[-1] in border and not np.isin(row[1:-1], border).any():
-            yield _remedy(result, row, f"a seam along {name}", {"line": name})
-    if worst in border:
-        # A short cut at the border relieves nothing: it has to reach behind the region.
-        inside = np.setdiff1d(result.vertex_origin[result.faces[misfit.faces].ravel()], border)
-        if len(inside) == 0:
-            return
-        worst = int(inside[np.argmax(np.linalg.norm(points[inside] - points[worst], axis=1))])
-    # From the nearest vertex of the border, and from the nearest in a direction more than 72 degrees from that.
-    away = points[border] - points[worst]
-    distance = np.linalg.norm(away, axis=1)
-    first = int(np.argmin(distance))
-    cosine = away @ away[first] / np.maximum(distance * distance[first], 1e-300)
-    others = np.flatnonzero(cosine < 0.3)
-    feet = [first, *([int(others[np.argmin(distance[others])])] if len(others) else [])]
-    for foot in feet:
-        try:
-            path = line_between(result.surface, int(border[foot]), worst)
-        except InputError:
-            continue
-        # A shortest path may run along the border first.
-        last = int(np.flatnonzero(np.isin(path, border))[-1])
-        if len(path) - last > 1:
-            ends = ([round(x, 5) for x in points[path[at]].tolist()] for at in (last, -1))
-            yield _remedy(result, path[last:], "a dart from the border", dict(zip(("from", "to"), ends, strict=True)))
-
-
-def _remedy(result: Flattening, path: NDArray[np.integer], what: str, table: Mapping[str, Any]) -> Remedy:
-    points = result.surface.vertices[path]
-    length = polyline_length(points)
-    start, end = (f"({', '.join(f'{100 * x:.0f}' for x in point)})" for point in (points[0], points[-1]))
-    return Remedy(
-        words=f"{what}, {100 * length:.1f} cm, from {start} to {end} cm",
-        path=path.astype(np.int32),
-        length=length,
-        table=table,
-    )
+    places = dict.fromkeys(int(result.vertex_origin[misfit.relieved_at]) for misfit in fit.held_regions[:_PLACES])
+    found, helpful = list[Remedy](), list[Remedy]()
+    with suppress(InputError):
+        able = [
+            one for one in find_candidates(unsewn, list(places)) if one.price.opens and one.price.length >= _LEAST_CUT
+        ]
+        for one in sorted(able, key=lambda one: -one.price.relieved / one.price.length):
+            if one.table is None or len(found) == _KEPT:
+                continue
+            what = (
+                f"a {'dart' if one.places else 'seam'} along {one.table['line']}"
+                if "line" in one.table
+                else "a dart from the border"
+            )
+            points = result.surface.vertices[one.paths[0]]
+            start, end = (f"({', '.join(f'{100 * x:.0f}' for x in point)})" for point in points[[0, -1]])
+            length = one.drawn[0].length if one.drawn else polyline_length(points)
+            words = f"{what}, {100 * length:.1f} cm, from {start} to {end} cm"
+            found.append(Remedy(words=words, path=one.paths[0], length=length, table=one.table))
+            if not trial:
+                continue
+            # A path that meets a cut which was made before is refused.
+            with suppress(InputError):
+                outside = evaluate(unsewn, one, relax=coarse_options(unsewn.options)).outside_after
+                if outside < _HELPS * unsewn.fit.outside:
+                    helpful.append(replace(found[-1], outside=outside))
+    return sorted(helpful, key=lambda tried: tried.outside or 0.0) if trial else found
 
 
 def contact_note(result: Flattening) -> str | None:
@@ -162,18 +105,15 @@ def contact_note(result: Flattening) -> str | None:
         return None
     path = cut_between_contacts(result)
     piece = result.unsewn or result
-    options = piece.options
-    quick = replace(
-        options,
-        energy_tolerance=min(_TRIAL_TOLERANCE * options.energy_tolerance, 1.0),
-        residual_tolerance=_TRIAL_TOLERANCE * options.residual_tolerance,
-        gap_mm=0.0,
-    )
     try:
-        opened = None if path is None else cut(piece, CutPlan(name="trial", paths=(path,)), relax=quick)
+        opened = (
+            None
+            if path is None
+            else cut(piece, CutPlan(name="trial", paths=(path,)), relax=coarse_options(piece.options))
+        )
     except InputError:
         opened = None  # The path meets a cut that was made before.
-    price = f"contact costs more than {100 * options.contact_share:.3g} % of the energy"
+    price = f"contact costs more than {100 * result.options.contact_share:.3g} % of the energy"
     if (
         path is None
         or opened is None

@@ -144,9 +144,13 @@ class StiffnessFactor:
         alignments: Sequence[GrainAlignment] = (),
         *,
         dtype: type[np.floating] = np.float64,
+        cells: FloatArray | None = None,
     ) -> None:
-        """Factor the stiffness in a layout (#V by 2 [m]) without mirrored cells, in a precision; chords of pieces resist being turned."""
-        matrix, free = stiffness_matrix(network, positions), network.bonds.freedom.numpy().ravel()
+        """Factor the stiffness in a layout (#V by 2 [m]) without mirrored cells, in a precision; chords of pieces resist being turned.
+
+        Of a membrane `cells` may give the stiffness of each cell (see :func:`cell_stiffness`).
+        """
+        matrix, free = stiffness_matrix(network, positions, cells), network.bonds.freedom.numpy().ravel()
         if alignments:
             # Each end of a chord is held sideways. A piece that no force moves along has one place and direction then, and the chord
             # couples no far vertices, which would fill the factor.
@@ -250,10 +254,11 @@ class Metric:
         return solve
 
 
-def stiffness_matrix(network: SpringNetwork, positions: FloatArray) -> csc_array:
+def stiffness_matrix(network: SpringNetwork, positions: FloatArray, known: FloatArray | None = None) -> csc_array:
     """Return the stiffness of a network in a layout (#V by 2 [m]), 2 #V by 2 #V [N/m]: J^T J of springs and guard, and that of cells.
 
-    It leaves out what is negative, as across compressed springs and threads, so that each direction is one of descent.
+    It leaves out what is negative, as across compressed springs and threads, so that each direction is one of descent. That of a
+    membrane's cells may be `known` (see :func:`cell_stiffness`).
     """
     cells, size = network.cell_arrays, 2 * network.vertex_count
     free, matrix = diags_array(network.bonds.freedom.numpy().ravel()), csc_array((size, size))
@@ -266,18 +271,12 @@ def stiffness_matrix(network: SpringNetwork, positions: FloatArray) -> csc_array
             )
             matrix = matrix + rows.T @ rows
         else:
-            matrix = matrix + free @ _membrane_stiffness(network, positions, part, slice(begin, end)) @ free
+            entries = (cell_stiffness(network, positions, part) if known is None else known)[begin:end]
+            place = 2 * cells.corner[begin:end, :, None] + np.arange(2, dtype=np.int32)
+            at = (np.broadcast_to(each, entries.shape) for each in (place[:, :, :, None, None], place[:, None, None]))
+            summed = csc_array(coo_array((entries.ravel(), tuple(each.ravel() for each in at)), shape=(size, size)))
+            matrix = matrix + free @ summed @ free
     return csc_array(matrix)
-
-
-def _membrane_stiffness(network: SpringNetwork, positions: FloatArray, part: CellModel, cells: slice) -> csc_array:
-    """Return the stiffness of the cells of a part that is a membrane: of each the second derivative, without what is negative."""
-    size, entries = 2 * network.vertex_count, cell_stiffness(network, positions, part)[cells]
-    place = 2 * network.cell_arrays.corner[cells][:, :, None] + np.arange(2, dtype=np.int32)
-    rows, columns = (
-        np.broadcast_to(each, entries.shape) for each in (place[:, :, :, None, None], place[:, None, None])
-    )
-    return csc_array(coo_array((entries.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size)))
 
 
 def cell_stiffness(network: SpringNetwork, positions: FloatArray, part: CellModel) -> FloatArray:

@@ -10,6 +10,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.vectors import reflected
 from warpflat.flat.surface.border_seams import SAME_PLACE
 from warpflat.flat.surface.connectivity import join_labels
 from warpflat.flat.surface.half_edges import half_edges
@@ -111,16 +112,15 @@ def mirror_images(surfaces: Mapping[str, Surface]) -> dict[str, tuple[str, IntAr
     tree = cKDTree(points)
     some = points[:: max(1, len(points) // 200)]
 
-    def image(at: FloatArray, normal: FloatArray) -> FloatArray:
-        return np.asarray(at - 2.0 * ((at - middle) @ normal)[:, None] * normal)
-
     # The normal of a plane of symmetry is a principal axis.
     axes = np.linalg.eigh(np.cov((points - middle).T))[1].T
-    axis = next((one for one in axes if np.median(tree.query(image(some, one))[0]) < SAME_PLACE), None)
+    axis = next(
+        (one for one in axes if np.median(tree.query(reflected(some, one, float(middle @ one)))[0]) < SAME_PLACE), None
+    )
     if axis is None:
         return {}
     place = join_labels(len(points), *tree.query_pairs(SAME_PLACE, output_type="ndarray").T)
-    away, nearest = tree.query(image(points, axis))
+    away, nearest = tree.query(reflected(points, axis, float(middle @ axis)))
     opposite = np.where(away < 2.0 * SAME_PLACE, place[nearest], -1)
     first = np.cumsum([0, *(len(surface.vertices) for surface in surfaces.values())])
     where: dict[frozenset[int], tuple[int, dict[int, int]]] = {}

@@ -11,7 +11,7 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from warpflat.core import FloatArray, InputError, IntArray, nearest, polyline_length, short_repr, start_warp
+from warpflat.core import FloatArray, InputError, IntArray, nearest, polyline_length, reflected, short_repr, start_warp
 from warpflat.flat import Fabric, Surface, mirror_plane, vertex_normals
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.check_sewn import check_sewn
@@ -430,9 +430,7 @@ def _mirrored_in_place(placed: Mapping[str, FloatArray], welds: Sequence[Sequenc
         return dict(placed)
     normal, off = mirror_plane(*np.array(met).transpose(1, 0, 2))
     return {
-        name: points * across - 2.0 * np.outer((points * across) @ normal - off, normal)
-        if name.endswith(MIRRORED)
-        else points
+        name: reflected(points * across, normal, off) if name.endswith(MIRRORED) else points
         for name, points in placed.items()
     }
 

@@ -13,7 +13,16 @@ from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest
 from warpflat.garment.mannequin.halves import is_side
 from warpflat.garment.mannequin.layout import Layout
 
-__all__ = ["FormDart", "PlacedDart", "dart_along", "dart_part", "place_darts", "standard_darts", "usual_darts"]
+__all__ = [
+    "FormDart",
+    "PlacedDart",
+    "dart_along",
+    "dart_part",
+    "dart_rows",
+    "place_darts",
+    "standard_darts",
+    "usual_darts",
+]
 
 #: Where darts end unless they say otherwise [mm]: before the bust point along the bust line; below the bust's level in the
 #: front; below it in the back, where it stands for the shoulder blades' level; below the waist in skirts. Aldrich, Metric
@@ -320,6 +329,26 @@ def dart_along(
                 share = round(float(arc[len(wanted) - 1] / arc[-1]), 3)
                 return FormDart(name=name, piece=piece, line=line, part=(end, abs(end - share)))
     return None
+
+
+def dart_rows(
+    layout: Layout, vertices: FloatArray, bricks: Mapping[str, Sequence[str]], dart: FormDart
+) -> list[tuple[str, IntArray]]:
+    """Return the mannequin's vertices that a dart, or a cut along a whole line, slits on both sides of the body, and in which piece.
+
+    Args:
+        layout, vertices: of the form, #V by 3 [m].
+        bricks: by piece, both sides of the body.
+        dart: that is asked for.
+
+    Raises:
+        InputError: it does not fit the piece.
+    """
+    if not dart.parts_piece:
+        return [(each.piece, each.row) for each in place_darts(layout, vertices, bricks, [dart])]
+    row = np.array(_longest_run(_grid_line(layout, dart), _cloth(layout, bricks[dart.piece])), dtype=np.int32)
+    image = layout.mirror[row]
+    return [(dart.piece, row), *([] if np.array_equal(np.sort(image), np.sort(row)) else [(dart.piece, image)])]
 
 
 def dart_part(layout: Layout, vertices: FloatArray, bricks: Sequence[str], dart: PlacedDart) -> tuple[float, float]:

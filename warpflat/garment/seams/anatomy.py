@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from warpflat.core import FloatArray
+from warpflat.core import FloatArray, reflected
 from warpflat.flat import border_loops, components, euler_characteristic, mesh_edges
 from warpflat.garment.seams.cloth import Cloth, section
 from warpflat.garment.seams.fields import MirrorMap, Operators, mirror_map
@@ -158,6 +158,10 @@ class Anatomy:
     open_front: bool
     size: float
     notes: tuple[str, ...] = field(default=())
+
+    def image(self, points: FloatArray) -> FloatArray:
+        """Return the mirror images of points (... by 3 [m])."""
+        return reflected(points, self.normal, self.offset)
 
     def limbs_of(self, kind: str) -> list[Limb]:
         """Return the sleeves, or the legs."""
@@ -417,8 +421,7 @@ def _plane_of_symmetry(
     def closer(normal: FloatArray, offset: float, rounds: int) -> tuple[float, FloatArray, float]:
         """Return the asymmetry of a plane after some rounds of closest points, its normal and its offset."""
         for _ in range(rounds):
-            image = points - 2.0 * ((points @ normal) - offset)[:, None] * normal
-            away, nearest = tree.query(image)
+            away, nearest = tree.query(reflected(points, normal, offset))
             near = away <= max(float(np.quantile(away, 0.8)), 1e-3 * size)
             p, q = points[near], vertices[nearest[near]]
             p_mean, q_mean = p.mean(axis=0), q.mean(axis=0)
@@ -428,8 +431,7 @@ def _plane_of_symmetry(
             k = int(np.abs(axes.T @ normal).argmax()) if values[1] - values[0] < 0.05 * values[2] else 0
             normal = axes[:, k] * (1.0 if axes[:, k] @ normal >= 0 else -1.0)
             offset = float(normal @ (p_mean + q_mean)) / 2.0
-        image = points - 2.0 * ((points @ normal) - offset)[:, None] * normal
-        return float(np.median(tree.query(image)[0])), normal, offset
+        return float(np.median(tree.query(reflected(points, normal, offset))[0])), normal, offset
 
     normals = [np.cos(angle) * one + np.sin(angle) * other for angle in np.pi / 12 * np.arange(12)]
     found = [closer(normal, float(normal @ middle), 6) for normal in normals]
@@ -460,7 +462,7 @@ def _roles(
         for j in range(i + 1, len(raw)):
             if "hole" in (roles[i], roles[j]) or across[i] * across[j] >= 0.0:
                 continue
-            image = middle - 2.0 * across[i] * normal
+            image = reflected(middle, normal, offset)
             away = float(np.linalg.norm(image - raw[j][0]))
             ratio = max(length, raw[j][1]) / min(length, raw[j][1])
             if (
@@ -742,13 +744,12 @@ def averaged_limbs(anatomy: Anatomy, *, alike: bool) -> tuple[Limb, ...]:
     """Return the limbs, each the mean of itself and its mate's mirror image where both are nearly the same, or all `alike`."""
     if anatomy.mirror is None:
         return anatomy.limbs
-    normal, offset = anatomy.normal, anatomy.offset
     made = []
     for limb in anatomy.limbs:
         mate = next((one for one in anatomy.limbs if one.kind == limb.kind and one.side == -limb.side), None)
         if mate is not None:
-            along = mate.along - 2.0 * float(mate.along @ normal) * normal
-            fork = mate.fork - 2.0 * (float(mate.fork @ normal) - offset) * normal
+            along = reflected(mate.along, anatomy.normal)
+            fork = anatomy.image(mate.fork)
             near = along @ limb.along > _SAME_WAY and np.linalg.norm(fork - limb.fork) < _BESIDE * anatomy.size
             if alike or near:
                 both = along + limb.along

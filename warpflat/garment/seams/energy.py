@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core import BoolArray, FloatArray, InputError, find_unused_name, report_activity, two_at_a_time
-from warpflat.flat import Fabric, Surface
+from warpflat.flat import Fabric, Flattening, Surface, components
 from warpflat.garment.seams.anatomy import Anatomy
 from warpflat.garment.seams.cloth import Cloth, PieceMesh, edge_components
 from warpflat.garment.seams.lines import MOUTH, WAIST, WIDE, Line, Offer, first_of_equals, offers
@@ -104,18 +104,19 @@ def cut_by_energy(
     # Who asks for less beyond the limit than is usual takes what brings less.
     least = _WORTH * min(options.limit / SeamOptions.limit, 1.0) * total
     most = options.most_pieces if options.most_pieces is not None else _usual_pieces(cloth, anatomy, len(pieces))
-    known = dict[int, list[Offer]]()
+    # What is laid out stays as it is until it is cut.
+    known = dict[Flattening, list[Offer]]()
     parting = False
     while (beyond := sum(piece.outside for piece in pieces)) > options.limit * total:
         cloth = remembered(cloth, pieces)
         twins = {number: _twin(number, pieces, anatomy) for number, piece in enumerate(pieces) if not piece.mirrored}
         floor = dict[int, float]()
         for number, twin in twins.items():
-            key, strained = _key(pieces[number].mesh), pieces[number].outside * (1 if twin is None else 2)
+            laid, strained = pieces[number].result, pieces[number].outside * (1 if twin is None else 2)
             floor[number] = least if parting else max(least, _WORTH_ALONE * strained)
-            if key not in known and strained > least:
+            if laid not in known and strained > least:
                 report_activity("seams: lines are priced")
-                known[key] = offers(cloth, pieces[number], anatomy, options, twice=twin is not None, may_part=parting)
+                known[laid] = offers(cloth, pieces[number], anatomy, options, twice=twin is not None, may_part=parting)
         best: tuple[float, Line, float, Cloth, list[Measured]] | None = None
         tried = 0
         # Offers are tried in the order of their prices. Most promise more than they hold, so the first that is worth more than the
@@ -124,7 +125,7 @@ def cut_by_energy(
             waiting = [
                 (number, offer)
                 for number in twins
-                for offer in known.get(_key(pieces[number].mesh), ())
+                for offer in known.get(pieces[number].result, ())
                 if offer.gain >= floor[number] and (best is None or offer.line is not best[1])
             ]
             order = first_of_equals(np.array([offer.value for _, offer in waiting]))
@@ -132,7 +133,7 @@ def cut_by_energy(
                 break
             number, offer = waiting[order[0]]
             report_activity(f"seams: trying {offer.line.name}")
-            left = known[_key(pieces[number].mesh)]
+            left = known[pieces[number].result]
             left.remove(offer)
             trial = _drawn(cloth, pieces, number, twins[number], offer.line, anatomy)
             if trial is None or int(trial[0].parts.max()) >= max(most, int(cloth.parts.max()) + 1):
@@ -191,14 +192,13 @@ def _drawn(
         return None
     if line.name == WAIST:
         # It goes all around.
-        seen = set[int]()
-        while left := [mesh for mesh in _across(made, line, anatomy) if _key(mesh) not in seen]:
-            seen.add(_key(left[0]))
-            changed.add(int(made.labels[OWNER][left[0].face_of[0]]))
-            made = _cut(made, left[0], line, _TRIAL) or made
+        for other in sorted(set(range(len(pieces))) - changed):
+            for mesh in _across(made, made.labels[OWNER] == other, line, anatomy):
+                changed.add(other)
+                made = _cut(made, mesh, line, _TRIAL) or made
     elif twin is not None or line.is_lopsided(anatomy):
-        target = _mesh_at(made, pieces[number if twin is None else twin].mesh)
-        both = None if target is None else _cut(made, target, line.mirrored(anatomy), _MATE)
+        targets = made.pieces(made.labels[OWNER] == (number if twin is None else twin))
+        both = next(filter(None, (_cut(made, mesh, line.mirrored(anatomy), _MATE) for mesh in targets)), None)
         if both is None:
             # A panel on one side alone is no tailor's.
             return None if line.parts else (made, changed)
@@ -360,12 +360,6 @@ def _can_be_sewn(cloth: Cloth, line: Line, before: Sequence[Measured], after: Se
     return MOUTH <= widest <= WIDE * cloth.seam_length(_TRIAL)
 
 
-def _key(mesh: PieceMesh) -> int:
-    """Return a number by which a piece is known while others are cut: its area and place, rounded."""
-    middle = mesh.vertices[mesh.faces].mean(axis=1).mean(axis=0)
-    return hash((len(mesh.faces), tuple(np.round(middle, 4).tolist())))
-
-
 def _side_of(mesh: PieceMesh, anatomy: Anatomy) -> int:
     return 1 if float((mesh.vertices @ anatomy.normal).mean()) - anatomy.offset > 0.0 else -1
 
@@ -376,7 +370,7 @@ def _twin(number: int, pieces: Sequence[Measured], anatomy: Anatomy) -> int | No
         return None
     middles = np.array([one.mesh.vertices[one.mesh.faces].mean(axis=(0, 1)) for one in pieces])
     across = float(middles[number] @ anatomy.normal) - anatomy.offset
-    away = np.linalg.norm(middles - middles[number] + 2.0 * across * anatomy.normal, axis=1)
+    away = np.linalg.norm(middles - anatomy.image(middles[number]), axis=1)
     away[number] = np.inf
     nearest = int(away.argmin())
     if abs(across) < 0.04 * anatomy.size or away[nearest] > 0.06 * anatomy.size:
@@ -384,12 +378,12 @@ def _twin(number: int, pieces: Sequence[Measured], anatomy: Anatomy) -> int | No
     return nearest if abs(pieces[nearest].area / pieces[number].area - 1.0) < 0.25 else None
 
 
-def _across(cloth: Cloth, line: Line, anatomy: Anatomy) -> list[PieceMesh]:
-    """Return the pieces of the trunk that a plane parts well inside."""
+def _across(cloth: Cloth, among: BoolArray, line: Line, anatomy: Anatomy) -> list[PieceMesh]:
+    """Return the pieces of the trunk with some of these faces (#F) that a plane parts well inside."""
     sleeve = cloth.labels.get("sleeve", np.full(len(cloth.faces), -1))
     beside = _BESIDE_WAIST * anatomy.size
     found = []
-    for mesh in cloth.pieces():
+    for mesh in cloth.pieces(among):
         height = (mesh.vertices - line.point) @ line.normal
         if np.median(sleeve[mesh.face_of]) < 0 and height.min() < -beside and height.max() > beside:
             found.append(mesh)
@@ -451,8 +445,6 @@ def _cut(cloth: Cloth, mesh: PieceMesh, line: Line, name: str) -> Cloth | None:
 
 def _reached_within(cloth: Cloth, allowed: BoolArray, start: FloatArray) -> BoolArray:
     """Return #F, the allowed faces that hang together with the one nearest to a place."""
-    from warpflat.flat import components
-
     chosen = np.flatnonzero(allowed)
     found = np.zeros(len(cloth.faces), dtype=bool)
     if len(chosen) == 0:
@@ -462,14 +454,6 @@ def _reached_within(cloth: Cloth, allowed: BoolArray, start: FloatArray) -> Bool
     first = int(np.linalg.norm(middle - start, axis=1).argmin())
     found[chosen[part == part[first]]] = True
     return found
-
-
-def _mesh_at(cloth: Cloth, mesh: PieceMesh) -> PieceMesh | None:
-    """Return the piece of the cloth that lies where another one did."""
-    middle = mesh.vertices[mesh.faces].mean(axis=(0, 1))
-    meshes = list(cloth.pieces())
-    away = [float(np.linalg.norm(one.vertices[one.faces].mean(axis=(0, 1)) - middle)) for one in meshes]
-    return meshes[int(np.argmin(away))] if meshes else None
 
 
 def _renamed(cloth: Cloth, old: str, new: str) -> Cloth:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, csr_array, diags_array
 
-from warpflat.core import FloatArray, factor_symmetric
+from warpflat.core import FloatArray, factor_symmetric, reflected
 from warpflat.flat import area_vectors, face_normals, nearest_on_triangles, vertex_normals
 
 __all__ = ["MirrorMap", "Operators", "mirror_map"]
@@ -147,10 +147,9 @@ def mirror_map(
     from scipy.spatial import cKDTree
 
     corners = vertices[faces]
-    image = vertices - 2.0 * ((vertices @ normal) - offset)[:, None] * normal
+    image = reflected(vertices, normal, offset)
     turned = face_normals(vertices, faces)
-    facing = Operators(vertices=vertices, faces=faces).vertex_normals
-    facing = facing - 2.0 * (facing @ normal)[:, None] * normal
+    facing = reflected(Operators(vertices=vertices, faces=faces).vertex_normals, normal)
     tried = min(_TRIED, len(faces))
     nearest = np.asarray(cKDTree(corners.mean(axis=1)).query(image, k=tried)[1]).reshape(len(image), tried)
     best, shares, chosen = np.full(len(image), np.inf), np.zeros((len(image), 3)), np.zeros(len(image), dtype=np.int64)

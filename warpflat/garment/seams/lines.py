@@ -14,8 +14,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, FloatArray
-from warpflat.flat import ElasticCrack, LaidCloth, border_loops, components
+from warpflat.core import BoolArray, FloatArray, reflected
+from warpflat.flat import LaidCloth, border_loops, components
 from warpflat.garment.seams.anatomy import ROLES, Anatomy
 from warpflat.garment.seams.by_hand import level_of
 from warpflat.garment.seams.cloth import Cloth
@@ -34,14 +34,12 @@ WAIST = "waist"
 _SMOOTH = 0.05
 # A bulge has at least this curvature [rad], a misfit this share of what is beyond the limit; of each kind so many are looked at.
 _BULGE, _MISFIT, _PLACES = 0.12, 0.08, 6
-# Darts to a place are priced from so many directions; to one at the border they reach inwards by these shares.
-_DIRECTIONS, _REACHES = 12, (0.06, 0.11)
-# A dart is between these long; its tip keeps this far from the border, and by this share of its length: else it leaves a flap.
-_SHORTEST, _LONGEST, _NARROW, _FLAP = 0.03, 0.32, 0.03, 0.5
+# Darts to a place at the border reach inwards by these shares.
+_REACHES = (0.06, 0.11)
+# A dart is between these long; its tip keeps this far from the border.
+_SHORTEST, _LONGEST, _NARROW = 0.03, 0.32, 0.03
 # A dart opens by at least this [m], and no wider than this share of its length: such a wedge is no dart.
 MOUTH, WIDE = 4e-3, 0.6
-# Its sides lie over each other nowhere by more than this [m].
-_OVERLAP = 1e-3
 # A centimetre sewn counts as this much cloth beyond the limit [m2].
 _PRICE = 1e-5
 # What is worth the same within this share is chosen by its place.
@@ -89,15 +87,14 @@ class Line:
 
     def mirrored(self, anatomy: Anatomy) -> Line:
         """Return its mirror image."""
-        n, level = anatomy.normal, self.level
+        level = self.level
         if level is not None and level[0] == LEFT:
             level = LEFT, -level[1]
-        point, start, end = (
-            None if one is None else _image(one, anatomy) for one in (self.point, self.start, self.end)
-        )
+        point, start, end = (None if one is None else anatomy.image(one) for one in (self.point, self.start, self.end))
         assert point is not None
-        normal = self.normal - 2.0 * float(self.normal @ n) * n
-        return replace(self, normal=normal, point=point, start=start, end=end, level=level)
+        return replace(
+            self, normal=reflected(self.normal, anatomy.normal), point=point, start=start, end=end, level=level
+        )
 
     def field(self, cloth: Cloth) -> FloatArray:
         """Return a field on the cloth that is zero along it, #V."""
@@ -159,18 +156,11 @@ def offers(
         *(_darts(cloth, piece, laid, places, anatomy, twice=twice) if not options.forbids("dart") else ()),
         *(_seams(cloth, piece, laid, places, anatomy, options, twice=twice) if may_part else ()),
     ):
-        crack, sides = ElasticCrack(laid, rows), 2 if twice else 1
-        spans = [(0, len(at) - 1) for at in crack.at]
-        parted = crack.part(spans)
-        long = sum(at[-1] for at in crack.at)
-        if not line.parts:
-            widest = max(opening.max() for opening in parted.openings)
-            if min(opening.min() for opening in parted.openings) < -max(_OVERLAP, 0.05 * widest):
-                continue
-            if not MOUTH <= widest <= WIDE * crack.at[0][-1]:
-                continue
-        gain = sides * crack.relieved(parted)
-        found.append(Offer(line=line, gain=gain, length=sides * long, more=sides * len(rows) if line.parts else 0))
+        cost, sides = laid.price(rows), 2 if twice else 1
+        if not line.parts and not (cost.opens and MOUTH <= cost.opening <= WIDE * cost.length / len(rows)):
+            continue
+        more = sides * len(rows) if line.parts else 0
+        found.append(Offer(line=line, gain=sides * cost.relieved, length=sides * cost.length, more=more))
     order = first_of_equals(np.array([one.value for one in found]))
     best = list[Offer]()
     for one in (found[k] for k in order.tolist()):
@@ -188,7 +178,7 @@ def _darts(
     surface, flat, size = piece.surface, laid.positions, anatomy.size
     own, loop = piece.mesh.vertex_of, border_loops(surface.faces)[0].astype(np.int64)
     # A dart begins at no hem, and at no other dart.
-    free = ~_at_hem(cloth, own[loop], anatomy) & (np.bincount(own)[own[loop]] == 1)
+    starts = loop[~_at_hem(cloth, own[loop], anatomy) & (np.bincount(own)[own[loop]] == 1)]
     inner = np.flatnonzero(~laid.border)
     corners = surface.vertices[surface.faces[:, :3]]
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -201,29 +191,18 @@ def _darts(
     for place in places:
         if whole and across[place] < -middle:
             continue
-        ways = flat[loop] - flat[place]
-        far = np.linalg.norm(ways, axis=1)
         if place in deep:
-            for angle in np.arange(_DIRECTIONS) * 2.0 * np.pi / _DIRECTIONS:
-                seen = np.flatnonzero(ways @ [np.sin(angle), np.cos(angle)] > np.cos(np.pi / _DIRECTIONS) * far)
-                mouth = seen[far[seen].argmin()] if len(seen) else -1
-                if mouth >= 0 and free[mouth]:
-                    ends.append((int(loop[mouth]), int(place)))
-        elif free.any() and len(deep):
+            ends += [(mouth, place) for mouth in laid.mouths(place) if mouth in starts]
+        elif len(starts) and len(deep):
             # A place at the border is reached from there: inwards by a hand.
-            mouth = int(loop[np.where(free, far, np.inf).argmin()])
+            mouth = int(starts[np.linalg.norm(flat[starts] - flat[place], axis=1).argmin()])
             near = deep[np.linalg.norm(flat[deep] - flat[mouth], axis=1).argmin()]
             inwards = (flat[near] - flat[mouth]) / np.linalg.norm(flat[near] - flat[mouth])
             for reach in _REACHES:
                 tip = flat[mouth] + reach * size * inwards
                 ends.append((mouth, int(deep[np.linalg.norm(flat[deep] - tip, axis=1).argmin()])))
     for mouth, tip in dict.fromkeys(ends):
-        long = float(np.linalg.norm(flat[tip] - flat[mouth]))
-        if (
-            not max(_SHORTEST * size, 1e-9)
-            < long
-            < min(_LONGEST * size, np.linalg.norm(flat[loop] - flat[tip], axis=1).min() / _FLAP)
-        ):
+        if not _SHORTEST * size < float(np.linalg.norm(flat[tip] - flat[mouth])) < _LONGEST * size:
             continue
         start, end = surface.vertices[[mouth, tip]]
         normal = np.cross(end - start, facing[(surface.faces[:, :3] == tip).any(axis=1)].mean(axis=0))
@@ -234,10 +213,10 @@ def _darts(
         if whole and np.abs(across[[mouth, tip]]).max() > middle:
             if np.abs(across[[mouth, tip]]).min() < middle or across[mouth] * across[tip] < 0.0:
                 continue
-            near = ((loop, _image(start, anatomy)), (inner, _image(end, anatomy)))
+            near = ((loop, anatomy.image(start)), (inner, anatomy.image(end)))
             away_from = [np.linalg.norm(surface.vertices[among] - image, axis=1) for among, image in near]
             pairs.append((int(loop[away_from[0].argmin()]), int(inner[away_from[1].argmin()])))
-        rows = [row for pair in pairs if (row := _straight(laid, *pair)) is not None]
+        rows = [row for pair in pairs if (row := laid.dart(*pair)) is not None]
         if len(rows) == len(pairs) and _are_apart(rows):
             yield line, rows
 
@@ -245,13 +224,6 @@ def _darts(
 def _are_apart(rows: Sequence[Ids]) -> bool:
     """Return whether no vertex is in two rows, or twice in one."""
     return len(np.unique(np.concatenate(rows))) == sum(len(row) for row in rows)
-
-
-def _straight(laid: LaidCloth, start: int, end: int) -> Ids | None:
-    """Return the vertices along a straight line of the layout; None if it meets the border."""
-    way = laid.positions[end] - laid.positions[start]
-    way = way / max(float(np.linalg.norm(way)), 1e-300)
-    return laid.row(start, end, np.abs((laid.positions - laid.positions[start]) @ [way[1], -way[0]]))
 
 
 def _places(piece: Measured, anatomy: Anatomy) -> list[int]:
@@ -380,8 +352,3 @@ def _at_hem(cloth: Cloth, vertices: Ids, anatomy: Anatomy) -> BoolArray:
     low = heights[vertices] < heights.min() + _HEM * np.ptp(heights)
     ends = np.isin(role, [1 + ROLES.index(name) for name in ("hem", "sleeve", "leg")])
     return np.asarray(ends | (low & (role == 1 + ROLES.index("opening"))))
-
-
-def _image(point: FloatArray, anatomy: Anatomy) -> FloatArray:
-    """Return the mirror image of a point [m]."""
-    return point - 2.0 * (float(point @ anatomy.normal) - anatomy.offset) * anatomy.normal

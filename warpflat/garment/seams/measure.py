@@ -90,7 +90,7 @@ def _corners_laid(piece: Measured, anatomy: Anatomy) -> FloatArray:
     if not piece.mirrored:
         return flat
     there, here = piece.surface.vertices[faces], piece.mesh.vertices[piece.mesh.faces]
-    there = there - 2.0 * (there @ anatomy.normal - anatomy.offset)[..., None] * anatomy.normal
+    there = anatomy.image(there)
     face = cKDTree(there.mean(axis=1)).query(here.mean(axis=1))[1]
     corner = np.linalg.norm(here[:, :, None] - there[face][:, None], axis=3).argmin(axis=2)
     return np.asarray(flat[face[:, None], corner] * [-1.0, 1.0])

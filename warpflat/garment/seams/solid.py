@@ -289,8 +289,7 @@ def _around_handles(mesh: PieceMesh) -> Ids:
 
 def _image(mesh: PieceMesh, other: PieceMesh, mirror: Anatomy) -> Ids | None:
     """Return for each vertex of a piece the one of another piece that is its mirror image; None where the other is not its mirror image."""
-    images = mesh.vertices - 2.0 * (mesh.vertices @ mirror.normal - mirror.offset)[:, None] * mirror.normal
-    away, nearest = cKDTree(other.vertices).query(images)
+    away, nearest = cKDTree(other.vertices).query(mirror.image(mesh.vertices))
     return nearest if float(away.max()) < _SAME * mirror.size else None
 
 

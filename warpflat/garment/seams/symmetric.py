@@ -47,15 +47,12 @@ def averaged(cloth: Cloth, anatomy: Anatomy, operators: Operators) -> tuple[Clot
 
     Borders move to the mirror images of borders: a sleeve that is longer by a centimetre becomes half a centimetre shorter.
     """
-    mirror, normal, offset, size = anatomy.mirror, anatomy.normal, anatomy.offset, anatomy.size
+    mirror, image, size = anatomy.mirror, anatomy.image, anatomy.size
     if mirror is None:
         return cloth, "", False
     apart = ""
     if anatomy.asymmetry > 1e-3:
         apart = f"left and right differ by {1e3 * anatomy.asymmetry:.0f} mm in the middle: lines are averaged over both sides"
-
-    def image(points: FloatArray) -> FloatArray:
-        return np.asarray(points - 2.0 * (points @ normal - offset)[:, None] * normal)
 
     vertices = cloth.vertices
     gap = image(np.asarray(mirror.matrix @ vertices)) - vertices
@@ -146,7 +143,7 @@ def mirrored(cloth: Cloth, anatomy: Anatomy) -> tuple[Cloth, str]:
         image = np.array([mates.get(int(one), int(one)) for one in label[left]]) if name == "sleeve" else label[left]
         labels[name] = np.concatenate([label[left], image])
     made = Cloth(
-        vertices=np.concatenate([half, half[off] - 2.0 * height[off, None] * normal]),
+        vertices=np.concatenate([half, anatomy.image(half[off])]),
         faces=np.concatenate([faces, twin[faces][:, ::-1]]),
         values=values,
         labels=labels,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, FloatArray
+from warpflat.core import BoolArray, FloatArray, reflected
 from warpflat.flat import components
 from warpflat.garment.seams.anatomy import Anatomy, Limb
 from warpflat.garment.seams.cloth import Cloth, edge_components, section
@@ -177,14 +177,14 @@ def _armhole_fields(cloth: Cloth, anatomy: Anatomy) -> dict[int, FloatArray]:
             # Both planes become the mean of one and the mirror image of the other, if these are much the same.
             (one, at), (other, there) = found[number], found[mate]
             normal = anatomy.normal
-            image = other - 2.0 * (other @ normal) * normal
+            image = reflected(other, normal)
             shift = there - 2.0 * anatomy.offset * float(other @ normal)
             rim = anatomy.borders[limb.border].middle
             if abs((rim @ one - at) - (rim @ image - shift)) < 0.08 * size and one @ image > np.cos(np.radians(25.0)):
                 length = float(np.linalg.norm(one + image))
                 both, level = (one + image) / length, (at + shift) / length
                 found[number] = both, level
-                found[mate] = both - 2.0 * (both @ normal) * normal, level - 2.0 * anatomy.offset * float(both @ normal)
+                found[mate] = reflected(both, normal), level - 2.0 * anatomy.offset * float(both @ normal)
     return {number: cloth.vertices @ direction - at for number, (direction, at) in found.items()}
 
 
