@@ -84,7 +84,7 @@ def _cut(
         plan, garment = trial_of_scene(scene, device=device)
         wanting = [name for name, piece in garment.pieces.items() if not is_enough(piece)]
         asked = [name for name in wanting if name not in known]
-        cuts = list(candidate_cuts(plan, garment, usual_only=usual_only)) if asked else []
+        cuts = list(candidate_cuts(plan, garment, among=asked, usual_only=usual_only))
         for name in asked:
             known[name] = try_cuts(
                 plan, garment, [one for one in cuts if one[0]["piece"] == name], by=by, listed=False

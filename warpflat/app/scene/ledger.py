@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -106,18 +106,19 @@ def _flatten(plan: GarmentPlan, names: Sequence[str] | Mapping[str, Any], scene:
 
 
 def candidate_cuts(
-    plan: GarmentPlan, garment: Garment, *, usual_only: bool = False
+    plan: GarmentPlan, garment: Garment, *, among: Collection[str] | None = None, usual_only: bool = False
 ) -> Iterator[tuple[dict[str, Any], Price]]:
     """Yield tables of cuts that the pieces do not have yet: once a side, as both sides are cut; and what they would do.
 
     Args:
         plan, garment: the pieces before them (see `trial_of_scene`).
+        among: names of the pieces; all if not given.
         usual_only: the darts of a pattern book only.
     """
     layout, bricks, form = plan.mannequin.layout, plan.bricks, plan.form
     present = {dart.place for dart in form.recipe.darts}
     names = {(dart.piece, dart.name) for dart in form.recipe.darts}
-    unsewn = {name: piece.unsewn or piece for name, piece in garment.pieces.items()}
+    unsewn = {name: piece.unsewn or piece for name, piece in garment.pieces.items() if among is None or name in among}
     laid = {name: LaidCloth(piece.network, piece.positions) for name, piece in unsewn.items()}
 
     def priced(dart: FormDart) -> Iterator[tuple[dict[str, Any], Price]]:
@@ -131,12 +132,12 @@ def candidate_cuts(
             yield cut_of_dart(dart), laid[dart.piece].price(found)
 
     for dart in usual_darts(layout, form.vertices, bricks):
-        if dart.place not in present:
+        if dart.place not in present and dart.piece in unsewn:
             yield from priced(dart if (dart.piece, dart.like) in names else replace(dart, like=None))
     if usual_only:
         return
     found: set[tuple[Any, ...]] = set()
-    for dart in (dart for name, own in bricks.items() for dart in princess_seams(layout, own, name)):
+    for dart in (dart for name in unsewn for dart in princess_seams(layout, bricks[name], name)):
         found.add((dart.piece, dart.line, dart.part))
         yield from priced(dart)
     for name, piece in unsewn.items():
