@@ -145,7 +145,7 @@ def test_a_drape_is_done_without_its_pictures(
     [
         "warpflat.app.scene.frames.KeyFile.__init__",
         "warpflat.app.scene.frames.FrameRecorder._keep",
-        "warpflat.app.scene.frames.KeyFile.place_frames",
+        "warpflat.app.scene.frames.FilmStage.place_frames",
         "warpflat.pattern.export.usd.FrameWriter.write",
         "warpflat.pattern.export.usd.FrameWriter.__exit__",
     ],

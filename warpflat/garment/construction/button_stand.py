@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, arc_lengths, find_unused_name, part_between
+from warpflat.core import FloatArray, InputError, arc_lengths, find_unused_name, off_line, part_between
 from warpflat.garment.construction.edges import (
     ON_EDGE,
     backwards,
@@ -166,8 +166,7 @@ def _down_its_edge(piece: Piece, name: str, what: str) -> tuple[Edge, Edge, Edge
     before, after = beside(piece, name)
     edge = piece.edge(name)
     x, y = direction(edge.points)
-    out = np.array([y, -x])
-    stray = float(np.abs((edge.points - edge.points[0]) @ out).max())
+    stray = float(off_line(edge.points, edge.points[[0, -1]]).max())
     if stray > FOLD_STRAIGHT:
         raise InputError(
             f"{piece.name}.{name} strays {1e3 * stray:.1f} mm from straight and cannot {what}; constrain it, "
@@ -175,7 +174,7 @@ def _down_its_edge(piece: Piece, name: str, what: str) -> tuple[Edge, Edge, Edge
         )
     row = [replace(each, vertices=None) for each in (piece.edge(before), edge, piece.edge(after))]
     upper, edge, lower = row if runs_down(piece, edge.points) else backwards(row)
-    return upper, edge, lower, out
+    return upper, edge, lower, np.array([y, -x])
 
 
 def _with_sides(piece: Piece, name: str, new: Mapping[str, Sequence[Edge]]) -> Piece:
