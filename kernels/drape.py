@@ -4,8 +4,8 @@ The membrane is that of `membrane.py`, with F = dX/dx now a 3 by 2 matrix: psi =
 flat area, where the rest state is the flat pattern in its own thread directions. Bending is the quadratic energy of
 cloth that hardly stretches, 1/2 B |Laplacian of x|^2 (Wardetzky et al. 2007), with the cotangent Laplacian of the flat
 pieces at the vertices inside. By edges, as Bergou et al. 2006 have it, grids are three times too stiff along their
-lines. The body is one plane per vertex with a stiff skin. Friction is Coulomb's: a spring to an anchor in the plane, whose
-force is bounded.
+lines. Contact is a plane beside a vertex with a stiff skin: the body's, which is fixed, or that of another layer of cloth, which its
+triangle carries. Friction is Coulomb's: a spring to an anchor in the plane, whose force is bounded.
 """
 
 import warp as wp
@@ -171,6 +171,20 @@ def gather(
     return total
 
 
+@wp.func
+def push_of_plane(gap: wp.float64, skin: wp.float64, before: wp.float64):
+    """Return the force of a plane on a vertex: that which it had at no gap [m], less the skin's for the gap; never a pull [N]."""
+    return wp.max(before - skin * gap, wp.float64(0.0))
+
+
+@wp.func
+def friction_force(x: wp.vec3d, n: wp.vec3d, anchor: wp.vec3d, grip: wp.float64, most: wp.float64):
+    """Return the force of friction: a spring to the anchor in the plane, at most `most` [N]."""
+    off = anchor - x
+    off = off - n * wp.dot(off, n)
+    return off * wp.min(grip, most / wp.max(wp.length(off), TINY))
+
+
 @wp.kernel
 def gather_drape(
     motion: Motion,
@@ -203,23 +217,12 @@ def gather_drape(
         e += half * wp.dot(moment[i], moment[i]) / bending.stiffness[i]
     n = contact.normal[i]
     if wp.dot(n, n) > half:
-        skin = contact.skin[i]
         before = contact.pressed[i]
-        push = wp.max(before + skin * wp.dot(contact.centre[i] - x, n), zero)
-        e += half * (push * push - before * before) / skin
-        f += n * push
-        most = contact.most[i]
-        if most > zero:
-            off = x - contact.anchor[i]
-            off = off - n * wp.dot(off, n)
-            way = wp.length(off)
-            pull = contact.grip[i] * way
-            if pull <= most:
-                e += half * pull * way
-                f -= off * contact.grip[i]
-            else:
-                e += most * (way - half * most / contact.grip[i])
-                f -= off * (most / way)
+        push = push_of_plane(wp.dot(x - contact.centre[i], n), contact.skin[i], before)
+        e += half * (push * push - before * before) / contact.skin[i]
+        rub = friction_force(x, n, contact.anchor[i], contact.grip[i], contact.most[i])
+        e += wp.dot(contact.anchor[i] - x, rub) - half * wp.dot(rub, rub) / contact.grip[i]
+        f += n * push + rub
     energy[i] = e
     if motion.fixed[i] != wp.int8(0):
         f = wp.vec3d(zero, zero, zero)

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from .drape import TINY, Bending, Contact, Motion, gather
+from .drape import TINY, Bending, Contact, Motion, friction_force, gather, push_of_plane
 from .indices import natural
 
 wp.set_module_options({"enable_backward": False})
@@ -72,14 +72,6 @@ def load_contact(
     contact.rubbed[i] = -f
 
 
-@wp.func
-def friction_force(x: wp.vec3d, n: wp.vec3d, anchor: wp.vec3d, grip: wp.float64, most: wp.float64):
-    """Return the force of friction: a spring to the anchor in the plane, at most `most` [N]."""
-    off = anchor - x
-    off = off - n * wp.dot(off, n)
-    return off * wp.min(grip, most / wp.max(wp.length(off), TINY))
-
-
 @wp.kernel
 def carry_contact(motion: Motion, contact: Contact, first: int):
     """Take over the forces of body and friction at the present places, and put back on its plane what presses on it.
@@ -95,12 +87,12 @@ def carry_contact(motion: Motion, contact: Contact, first: int):
         contact.pressed[i] = zero
         return
     x = motion.position[i]
-    depth = wp.dot(contact.centre[i] - x, n)
-    push = wp.max(contact.pressed[i] + contact.skin[i] * depth, zero)
+    gap = wp.dot(x - contact.centre[i], n)
+    push = push_of_plane(gap, contact.skin[i], contact.pressed[i])
     contact.rubbed[i] = friction_force(x, n, contact.anchor[i], contact.grip[i], contact.most[i])
     contact.pressed[i] = push
     if push > zero and motion.fixed[i] == wp.int8(0):
-        motion.position[i] = x + n * depth
+        motion.position[i] = x - n * gap
 
 
 @wp.kernel

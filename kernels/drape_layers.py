@@ -2,6 +2,7 @@
 
 import warp as wp
 
+from .drape import push_of_plane
 from .indices import natural
 
 wp.set_module_options({"enable_backward": False})
@@ -100,14 +101,12 @@ def press_layers(
     c = corner[k]
     w = share[k]
     place = position[natural(c[0])] * w[0] + position[natural(c[1])] * w[1] + position[natural(c[2])] * w[2]
-    zero = wp.float64(0.0)
-    deep = zero
+    gap = wp.float64(0.0)
     if wp.dot(n, n) > wp.float64(0.5):
-        deep = wp.max(apart - wp.dot(position[i] - place, n), zero)
-    push = n * (skin[i] * deep)
-    energy[natural(begin + k)] = wp.float64(0.5) * skin[i] * deep * deep
+        gap = wp.dot(position[i] - place, n) - apart
+    push = push_of_plane(gap, skin[i], wp.float64(0.0))
+    energy[natural(begin + k)] = -wp.float64(0.5) * push * gap
     at = natural(3 * begin + 4 * k)
-    force[at] = push
-    force[at + 1] = -push * w[0]
-    force[at + 2] = -push * w[1]
-    force[at + 3] = -push * w[2]
+    force[at] = n * push
+    for j in range(3):
+        force[natural(at + 1 + j)] = -n * (push * w[j])

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from .drape import TINY, Contact, Motion, draped_cell
+from .drape import TINY, Contact, Motion, draped_cell, push_of_plane
 from .indices import natural
 from .membrane_cell import Cloth
 
@@ -101,7 +101,7 @@ def stiffen_contact(
     x = motion.position[i]
     if wp.dot(n, n) > wp.float64(0.5):
         beside = unit - wp.outer(n, n)
-        if contact.pressed[i] + contact.skin[i] * wp.dot(contact.centre[i] - x, n) > zero:
+        if push_of_plane(wp.dot(x - contact.centre[i], n), contact.skin[i], contact.pressed[i]) > zero:
             total += wp.outer(n, n) * contact.skin[i]
         most = contact.most[i]
         if most > zero:

@@ -12,6 +12,7 @@ from warpflat.kernels.drape import (
     Motion,
     evaluate_cloth,
     evaluate_curvature,
+    gather_drape,
 )
 from warpflat.kernels.drape_contact import anchor_friction
 from warpflat.kernels.drape_steps import advance_drape, watch_power
@@ -157,6 +158,35 @@ def test_friction_holds_up_to_its_share_of_what_presses():
     # In the plane 5 N were rubbed: all of it is held, or 2 N of it.
     force = np.array([[3.0, 0.0, -4.0], [1.2, 0.0, -1.6], [0.0, 0.0, 0.0]])
     np.testing.assert_allclose(contact.anchor.numpy(), places + force / 50.0, atol=1e-12)
+
+
+def test_forces_of_body_and_friction_are_the_gradient_of_their_energy():
+    """Vertices that are rubbed by less and by more than Coulomb's bound, that press with what they carry alone, and that lie off."""
+    places = np.array([[0.0, -1e-3, 0.0], [2.0, -2e-3, 1.0], [3.0, 1e-3, 0.0], [4.0, 0.1, 0.0]])
+    contact, count = Contact(), len(places)
+    contact.centre, contact.normal = on(np.zeros((count, 3)), wp.vec3d), on([[0.0, 1.0, 0.0]] * count, wp.vec3d)
+    contact.skin, contact.grip = on([100.0] * count, wp.float64), on([50.0] * count, wp.float64)
+    contact.pressed, contact.most = on([0.0, 0.5, 0.5, 0.5], wp.float64), on([1.0, 1.0, 1.0, 0.0], wp.float64)
+    off = np.array([[0.01, 0.3, 0.0], [0.6, 0.0, 0.8], [0.0, 0.0, 0.01], [0.1, 0.0, 0.0]])
+    contact.anchor = on(places + off, wp.vec3d)
+    none = [on(np.zeros(count + 1), wp.int32), on([], wp.int32), wp.empty(0, wp.vec3d, DEVICE)]
+    none += [make_bending(np.zeros((count, count)), np.zeros(count)), on(np.zeros((count, 3)), wp.vec3d)]
+
+    def gathered(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        motion = Motion()
+        motion.position, motion.weight = on(at, wp.vec3d), on(np.zeros(count), wp.float64)
+        motion.fixed = on(np.zeros(count), wp.int8)
+        force, energy = wp.zeros(count, wp.vec3d, DEVICE), wp.zeros(count, wp.float64, DEVICE)
+        launch_each(gather_drape, count, [motion, 0.0, contact, *none], [force, energy], device=DEVICE)
+        return force.numpy(), energy.numpy()
+
+    force, _ = gathered(places)
+    asked = [[0.5, 0.1, 0.0], [0.6, 0.7, 0.8], [0.0, 0.4, 0.5], [0.0, 0.0, 0.0]]
+    np.testing.assert_allclose(force, asked, atol=1e-12)
+    for axis in np.eye(3):
+        step = 1e-6 * axis
+        slope = (gathered(places + step)[1] - gathered(places - step)[1]) / 2e-6
+        np.testing.assert_allclose(force @ axis, -slope, atol=1e-8)
 
 
 @pytest.mark.parametrize(("sums", "halts"), [([1.0, -0.5], 0), ([1.0, -1.5], 1), ([0.0, 0.0], 0)])

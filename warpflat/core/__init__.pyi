@@ -76,6 +76,7 @@ from .output import write_sealed as write_sealed
 from .output import written_folders as written_folders
 from .polyline import arc_lengths as arc_lengths
 from .polyline import nearest_on_polyline as nearest_on_polyline
+from .polyline import off_line as off_line
 from .polyline import part_between as part_between
 from .polyline import points_at_lengths as points_at_lengths
 from .polyline import polyline_length as polyline_length

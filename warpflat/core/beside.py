@@ -62,8 +62,8 @@ class Beside(Generic[Result]):
             activity: reported while the other process is waited for.
         """
         self._function, self._activity = function, activity
-        self.process = self._child = 0
-        self._pipe = -1
+        self.process = 0
+        self._child: Any = None
 
     def __enter__(self) -> Beside[Result]:
         if not _is_allowed.get() or sys.platform != "linux" or thread_count() < 2:
@@ -71,26 +71,19 @@ class Beside(Generic[Result]):
         warp = sys.modules.get("warp")
         if warp is not None and warp.is_cuda_available():
             return self  # nor does a process with a CUDA device
-        read, write = os.pipe()
-        parent = os.getpid()
-        try:
-            child = os.fork()
-        except OSError:  # no memory, or no process, for it
-            os.close(read)
-            os.close(write)
-            return self
-        if child == 0:
-            os.close(read)
-            _run_in_child(self._function, write, parent)
-        os.close(write)
-        self.process = self._child = child
-        self._pipe = read
+        from multiprocessing import get_context
+
+        context = get_context("fork")
+        self._answer, answer = context.Pipe(duplex=False)
+        child = context.Process(target=_answer_in_child, args=(self._function, answer, os.getpid()))
+        with answer, suppress(OSError):  # no memory, or no process, for it
+            child.start()
+            self._child, self.process = child, child.pid or 0
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._child:
-            with suppress(ProcessLookupError):
-                os.kill(self._child, signal.SIGKILL)
+        if self._child is not None:
+            self._child.kill()
             self._wait()
 
     def result(self) -> Result:
@@ -98,17 +91,16 @@ class Beside(Generic[Result]):
 
         Where its process has died, which the system does where memory is short, the function runs again in this one.
         """
-        if not self._child:
+        if self._child is None:
             return self._function()
         if self._activity:
             report_activity(self._activity)
-        parts = []
-        while part := os.read(self._pipe, 1 << 20):
-            parts.append(part)
-        self._wait()
-        if not parts:
+        try:
+            good, value, read, left_out = self._answer.recv()
+        except (EOFError, OSError):
             return self._function()
-        good, value, read, left_out = pickle.loads(b"".join(parts))
+        finally:
+            self._wait()
         for path in read:
             note_read(path)
         for step in left_out:
@@ -118,10 +110,9 @@ class Beside(Generic[Result]):
         return value
 
     def _wait(self) -> None:
-        child, self._child = self._child, 0
-        os.close(self._pipe)
-        with suppress(ChildProcessError):
-            os.waitpid(child, 0)
+        child, self._child = self._child, None
+        child.join()
+        self._answer.close()
 
 
 def two_at_a_time(function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
@@ -143,37 +134,31 @@ def two_at_a_time(function: Callable[[Item], Result], items: Iterable[Item]) -> 
                 yield other.result()
 
 
-def _run_in_child(function: Callable[[], Any], pipe: int, parent: int) -> None:
-    """Run the function, write its result or error into the pipe, and end the process without any cleaning up of the parent's."""
+def _answer_in_child(function: Callable[[], Any], answer: Any, parent: int) -> None:
+    """Run the function, and send whether it went well, its result or error, and what it has read and left out."""
     import ctypes
 
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        signal.signal(getattr(signal, name), signal.SIG_DFL)
+    # Let the system kill this process when its parent dies, so that it does not write into a folder that is being
+    # cleared.
+    ctypes.CDLL(None).prctl(_SIGNAL_OF_PARENTS_DEATH, signal.SIGKILL)
+    if os.getppid() != parent:  # it has died meanwhile
+        return
+    good, read, left_out = True, list[Path](), list[LeftOut]()
     try:
-        for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-            signal.signal(getattr(signal, name), signal.SIG_DFL)
-        # Let the system kill this process when its parent dies, so that it does not write into a folder that is being
-        # cleared.
-        ctypes.CDLL(None).prctl(_SIGNAL_OF_PARENTS_DEATH, signal.SIGKILL)
-        if os.getppid() != parent:  # it has died meanwhile
-            os._exit(0)
-        read, left_out = list[Path](), list[LeftOut]()
-        try:
-            with (
-                activity_listener(lambda activity: None),
-                listening_to_reads(read.append),
-                listening_to_left_out(left_out.append),
-            ):
-                answer: tuple[bool, Any] = True, function()
-        except Exception as error:
-            answer = False, error
-        try:
-            content = pickle.dumps((*answer, read, left_out))
-            pickle.loads(content)  # an exception may not be made again from its arguments
-        except Exception as error:
-            good, value = answer
-            what = f"{type(error).__name__}: {error}" if good else f"{type(value).__name__}: {value}"
-            content = pickle.dumps((False, RuntimeError(what), read, left_out))
-        unsent = memoryview(content)
-        while unsent:
-            unsent = unsent[os.write(pipe, unsent) :]
-    finally:
-        os._exit(0)
+        with (
+            activity_listener(lambda activity: None),
+            listening_to_reads(read.append),
+            listening_to_left_out(left_out.append),
+        ):
+            value = function()
+    except Exception as error:
+        good, value = False, error
+    try:
+        content = pickle.dumps((good, value, read, left_out))
+        pickle.loads(content)  # an exception may not be made again from its arguments
+    except Exception as error:
+        fault = error if good else value
+        content = pickle.dumps((False, RuntimeError(f"{type(fault).__name__}: {fault}"), read, left_out))
+    answer.send_bytes(content)

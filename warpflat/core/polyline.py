@@ -14,6 +14,7 @@ from warpflat.core.arrays import FloatArray
 __all__ = [
     "arc_lengths",
     "nearest_on_polyline",
+    "off_line",
     "part_between",
     "points_at_lengths",
     "polyline_length",
@@ -117,6 +118,12 @@ def nearest_on_polyline(target: FloatArray, points: FloatArray) -> FloatArray:
     share, distance = project_on_segments(target, points[:-1], points[1:])
     nearest = int(np.argmin(distance))
     return np.asarray(points[nearest] + share[nearest] * (points[nearest + 1] - points[nearest]))
+
+
+def off_line(points: FloatArray, line: FloatArray) -> FloatArray:
+    """Return #P, the distances of points (#P by 2) from a straight line (2 by 2) that goes on both ways."""
+    (x, y), away = line[1] - line[0], points - line[0]
+    return np.asarray(np.abs(away[:, 0] * y - away[:, 1] * x) / np.hypot(x, y))
 
 
 def _around(points: FloatArray, closed: bool) -> FloatArray:

@@ -41,7 +41,7 @@ SURFACE = {
 DRAPE = {
     "drape.png": "warpflat.garment.draping.write.write_drape_picture",
     "drape.webp": "warpflat.garment.draping.write.write_drape_film",
-    "corrected.png": "warpflat.garment.draping.correction_picture.write_correction_picture",
+    "corrected.png": "warpflat.garment.draping.picture.write_correction_picture",
 }
 GARMENT = {
     "picture.png": "warpflat.pattern.export.picture._Band.draw",
@@ -145,7 +145,7 @@ def test_a_drape_is_done_without_its_pictures(
     [
         "warpflat.app.scene.frames.KeyFile.__init__",
         "warpflat.app.scene.frames.FrameRecorder._keep",
-        "warpflat.app.scene.frames.KeyFile.place_frames",
+        "warpflat.app.scene.frames.FilmStage.place_frames",
         "warpflat.pattern.export.usd.FrameWriter.write",
         "warpflat.pattern.export.usd.FrameWriter.__exit__",
     ],

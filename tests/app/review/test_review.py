@@ -77,7 +77,7 @@ def test_the_packed_film_is_the_film(run: Path) -> None:
     planes = np.frombuffer(data[begin : begin + 4 * whole["vertices"]], dtype=np.uint8).reshape(2, -1).astype(np.uint16)
     steps = (planes[0] + 256 * planes[1]).reshape(2, -1).T
     x, y, size = piece["box"]
-    expected = source.positions(1, whole["vertices"])
+    expected = source.positions(1)
     np.testing.assert_allclose(np.array([x, y]) + steps / 65535 * size, expected, atol=size / 65535)
 
 
@@ -86,13 +86,12 @@ def test_all_frames_follow_from_the_layouts_that_the_page_holds(run: Path) -> No
     (source,) = open_film(run / "frames.usdc")
     assert len(stored) < 0.7 * len(source.times)
     for time in source.times:
-        shape = source.shape(max(change for change in source.changes if change <= time))
         before = max(frame for frame in stored if frame <= time)
         after = min(frame for frame in stored if frame >= time)
         share = (time - before) / max(after - before, 1)
-        ends = [source.positions(frame, len(shape.surface)) for frame in (before, after)]
+        ends = [source.positions(frame) for frame in (before, after)]
         expected = (1.0 - share) * ends[0] + share * ends[1]
-        np.testing.assert_allclose(source.positions(time, len(shape.surface)), expected, atol=1e-6)
+        np.testing.assert_allclose(source.positions(time), expected, atol=1e-6)
 
 
 def test_the_command_writes_the_page_again_and_moving_pictures(
@@ -187,7 +186,7 @@ def test_in_a_browser_the_slider_moves_the_mesh_and_no_request_leaves(run: Path,
     assert float(blend[1]) < 1e-6
     (source,) = open_film(run / "frames.usdc")
     points = np.array(first[1].split(","), dtype=float).reshape(-1, 3)[:, :2] - source.offset[:2]
-    np.testing.assert_allclose(points, source.positions(1, len(points)), atol=2e-5)
+    np.testing.assert_allclose(points, source.positions(1), atol=2e-5)
     assert "example.com" not in log.read_text(errors="replace")
 
 

@@ -13,7 +13,7 @@ from warpflat.core.errors import InputError
 from warpflat.garment.draping.drape_pattern import lay_pieces
 from warpflat.garment.draping.lay_around import Laid
 from warpflat.garment.draping.limbs import limb_lines, links
-from warpflat.garment.draping.mesh_pieces import mesh_pieces
+from warpflat.garment.draping.mesh_pieces import mesh_pieces, sew_meshes
 from warpflat.garment.draping.openings import Opening, find_openings
 from warpflat.garment.draping.sew_around import stretches
 from warpflat.garment.draping.sewn_cloth import SewnCloth
@@ -44,8 +44,9 @@ def joined(first: str, second: str) -> Seam:
 def lay(pieces: Sequence[Piece], seams: Sequence[Seam], **more: object) -> tuple[SewnCloth, list[Opening], Laid]:
     named = {each.name: each for each in pieces}
     meshes, welds = mesh_pieces(named, seams, 0.03)
-    openings, body = find_openings(meshes, welds), body_of_size(30.0)
-    cloth, laid = lay_pieces(named, meshes, welds, openings, body, fabric=warpflat.find_fabric("woven"), **more)  # type: ignore[arg-type]
+    cloth = sew_meshes(named, meshes, welds, fabric=warpflat.find_fabric("woven"))
+    openings = find_openings(cloth)
+    laid = lay_pieces(cloth, named, meshes, openings, body_of_size(30.0), **more)  # type: ignore[arg-type]
     return cloth, openings, laid
 
 

@@ -16,7 +16,7 @@ from warpflat.flat.surface.connectivity import border_loops
 from warpflat.garment.draping.check_sewn import check_sewn, pierced_edges
 from warpflat.garment.draping.drape_pattern import Placement, drape_pattern
 from warpflat.garment.draping.limbs import limb_lines, links, on_arm
-from warpflat.garment.draping.mesh_pieces import mesh_pieces
+from warpflat.garment.draping.mesh_pieces import mesh_pieces, sew_meshes
 from warpflat.garment.draping.openings import find_openings
 from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.sew_around import sew_around, stretches
@@ -107,7 +107,7 @@ def test_a_shirt_is_sewn_by_its_seams_alone():
     pattern, body = shirt(), body_of_size(30.0)
     pieces = {each.name: each for each in pattern.pieces[""]}
     meshes, welds = mesh_pieces(pieces, pattern.seams, 0.04)
-    openings = find_openings(meshes, welds)
+    openings = find_openings(sew_meshes(pieces, meshes, welds, fabric=warpflat.find_fabric("woven")))
     assert [each.length for each in openings] == pytest.approx([1.0, ARMHOLE, ARMHOLE, 0.36])
     assert [round(each.turn, 6) for each in openings[:3]] == [0.0, 0.0, 0.0]
     worn, _ = drape_pattern(

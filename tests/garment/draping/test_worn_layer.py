@@ -129,7 +129,7 @@ def test_a_cuff_is_closed_upon_itself():
     ((one, at), (other, its)) = closures({"cuff": cuff})[0]
     assert (one, other) == ("cuff", "cuff")
     np.testing.assert_allclose([at, its], [[0.24, 0.03], [0.0115, 0.03]])
-    meshes, welds = mesh_pieces({"cuff": cuff}, [], 0.01, closures({"cuff": cuff}))
+    meshes, welds = mesh_pieces({"cuff": cuff}, [], 0.01)
     (((_, first), (_, second)),) = welds[-1]
     np.testing.assert_allclose(meshes["cuff"].points[[first, second]], [at, its])
     assert len(np.unique(meshes["cuff"].triangles)) == len(meshes["cuff"].points)

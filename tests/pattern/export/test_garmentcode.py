@@ -17,7 +17,7 @@ from command import Command
 import warpflat
 from warpflat.core.errors import InputError
 from warpflat.garment.draping.drape_pattern import lay_pieces
-from warpflat.garment.draping.mesh_pieces import mesh_pieces
+from warpflat.garment.draping.mesh_pieces import mesh_pieces, sew_meshes
 from warpflat.garment.draping.openings import find_openings
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.piece_parts import Dart, Edge, Hole
@@ -401,9 +401,8 @@ def test_panels_hang_where_the_body_is():
     pieces, seams, _ = whole_pieces(pattern.pieces[""], pattern.seams)
     meshes, welds = mesh_pieces(pieces, seams, 0.03)
     body = warpflat.Mannequin.from_size("EU 38", resolution_mm=30.0)
-    cloth, laid = lay_pieces(
-        pieces, meshes, welds, find_openings(meshes, welds), body, fabric=warpflat.find_fabric("woven")
-    )
+    cloth = sew_meshes(pieces, meshes, welds, fabric=warpflat.find_fabric("woven"))
+    laid = lay_pieces(cloth, pieces, meshes, find_openings(cloth), body)
     assert {limb for limb in laid.limbs if limb} == {"left arm", "right arm"}
     # The skirt, a garment of its own, keeps its height, which is that of the waist at its upper edge.
     skirts = np.unique(np.concatenate([cloth.welded[cloth.piece_vertices[f"skirt_{side}"]] for side in "fb"]))

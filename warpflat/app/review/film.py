@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import base64
 import zlib
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -110,23 +111,27 @@ class FilmPiece:
         corners = np.array(self._pattern.GetFaceVertexIndicesAttr().Get(time), dtype=np.int32)
         on_surface = np.array(self._surface.GetFaceVertexIndicesAttr().Get(), dtype=np.int32)
         space = np.array(self._surface.GetPointsAttr().Get(), dtype=np.float64)
-        faces = np.full((len(counts), 4), -1, dtype=np.int32)
-        faces[np.arange(4) < counts[:, None]] = corners
         origin = np.zeros(int(corners.max()) + 1, dtype=np.int32)
         origin[corners] = on_surface
-        return Shape(faces=faces, surface=space[origin])
+        return Shape(faces=_faces(counts, corners), surface=space[origin])
 
-    def positions(self, time: int, count: int) -> FloatArray:
+    @cached_property
+    def shapes(self) -> list[Shape]:
+        """The topologies, one after the other."""
+        return [self.shape(change) for change in self.changes]
+
+    def number(self, time: int) -> int:
+        """Return the number of the topology at a frame."""
+        return max(bisect_right(self.changes, time) - 1, 0)
+
+    def positions(self, time: int) -> FloatArray:
         """Return the pattern at a frame, #P by 2 [m]."""
+        count = len(self.shapes[self.number(time)].surface)
         return np.array(self._pattern.GetPointsAttr().Get(time), dtype=np.float64)[:count, :2]
 
     def density(self, time: int) -> FloatArray:
         """Return the energies at a frame, #F [J/m2]."""
         return np.array(self._density.Get(time), dtype=np.float64)
-
-    def rows(self, time: int, colours: VertexColours) -> NDArray[np.uint8]:
-        """Return the row of the page's colour table of each vertex at a frame, #P."""
-        return colours.levels(self.density(time), self.scale, _COLOURS).astype(np.uint8)
 
     def key_frames(self) -> list[int]:
         """Return the computed frames without those at which the piece stands still, before and after; all others follow from them."""
@@ -138,6 +143,13 @@ class FilmPiece:
         """Return a measure of a frame, None if there is none."""
         attribute = self.prim.GetAttribute(f"warpflat:{key}")
         return attribute.Get(time) if attribute else None
+
+
+def _faces(counts: NDArray[Any], corners: NDArray[Any]) -> IntArray:
+    """Return the faces (#F by 4, -1 as the fourth of a triangle) whose corners stand one after the other."""
+    faces = np.full((len(counts), 4), -1, dtype=np.int32)
+    faces[np.arange(4) < counts[:, None]] = corners
+    return faces
 
 
 def open_film(path: Path) -> list[FilmPiece]:
@@ -183,14 +195,12 @@ def read_whole_film(path: Path) -> dict[str, Any] | None:
         pieces = open_film(path)
         for piece in pieces:
             for time in piece.times:
-                shape = piece.shape(
-                    max((change for change in piece.changes if change <= time), default=piece.changes[0])
-                )
-                if not np.abs(piece.positions(time, len(shape.surface))).max() < FARTHEST:
+                faces = piece.shapes[piece.number(time)].faces
+                if not np.abs(piece.positions(time)).max() < FARTHEST:
                     raise ValueError("a point that is no number")
-                if len(piece.density(time)) != len(shape.faces):
+                if len(piece.density(time)) != len(faces):
                     raise ValueError("energies of other faces")
-                if any(len(values) != len(shape.faces) for values, _ in piece.maps.values()):
+                if any(len(values) != len(faces) for values, _ in piece.maps.values()):
                     raise ValueError("a map of other faces")
             if not all(np.abs(values).max(initial=0.0) < _MOST_OF_MAP for values, _ in piece.maps.values()):
                 raise ValueError("a value of a map that is no number")
@@ -206,7 +216,6 @@ def pack_film(pieces: Sequence[FilmPiece]) -> dict[str, Any] | None:
 
     The entry `data` is the base64 text of what `zlib` has compressed; `pieces` says what lies in it, in its order.
     """
-    shapes = {piece.name: [piece.shape(change) for change in piece.changes] for piece in pieces}
     # Frames are taken evenly, with those before and after each change of topology, as many as there is room for.
     times, keys = pieces[0].times, {piece.name: piece.key_frames() for piece in pieces}
     for stride in range(1, len(times) + 1):
@@ -220,7 +229,7 @@ def pack_film(pieces: Sequence[FilmPiece]) -> dict[str, Any] | None:
                 # Layouts of keys, and between keys of which one is not shown.
                 if own[after] == time or not kept.issuperset(own[after - 1 : after + 1]):
                     stored[name].append(time)
-        vertices = sum(len(stored[piece.name]) * len(shapes[piece.name][-1].surface) for piece in pieces)
+        vertices = sum(len(stored[piece.name]) * len(piece.shapes[-1].surface) for piece in pieces)
         if _VERTEX * vertices <= _ROOM:
             break
     else:
@@ -231,15 +240,13 @@ def pack_film(pieces: Sequence[FilmPiece]) -> dict[str, Any] | None:
         if not all(key in piece.maps for piece in pieces):
             continue
         values = np.concatenate([piece.maps[key][0] for piece in pieces])
-        areas = np.concatenate(
-            [face_areas(shape.surface, shape.faces) for piece in pieces for shape in shapes[piece.name][:1]]
-        )
+        areas = np.concatenate([face_areas(piece.shapes[0].surface, piece.shapes[0].faces) for piece in pieces])
         high = Scale.from_zero(factor * values, areas, least).high
         maps[key] = {"unit": unit, "high": high, "state": pieces[0].maps[key][1]}
     packer = zlib.compressobj(_LEVEL)
     parts, entries = list[bytes](), list[dict[str, Any]]()
     for piece in pieces:
-        entry, blocks = _packed(piece, shapes[piece.name], stored[piece.name], maps)
+        entry, blocks = _packed(piece, stored[piece.name], maps)
         entries.append(entry)
         parts += [packer.compress(block) for block in blocks]
     parts.append(packer.flush())
@@ -283,9 +290,7 @@ def _packed_still(stage: Any) -> list[dict[str, Any]]:
         points = points[used]
         if not np.abs(points).max() < FARTHEST:
             continue
-        faces = np.full((len(counts), 4), -1, dtype=np.int32)
-        faces[np.arange(4) < counts[:, None]] = corners.reshape(-1)
-        triangles, _ = triangulate(faces)
+        triangles, _ = triangulate(_faces(counts, corners.reshape(-1)))
         box = _Box(points)
         data = zlib.compress(_planes(triangles.astype(np.uint32)) + _planes(box.steps(points)), _LEVEL)
         found.append(
@@ -302,12 +307,12 @@ def _packed_still(stage: Any) -> list[dict[str, Any]]:
 
 
 def _packed(
-    piece: FilmPiece, shapes: Sequence[Shape], stored: Sequence[int], maps: Mapping[str, Mapping[str, Any]]
+    piece: FilmPiece, stored: Sequence[int], maps: Mapping[str, Mapping[str, Any]]
 ) -> tuple[dict[str, Any], list[bytes]]:
     """Return what the page must know of a piece, and its arrays."""
-    space, blocks, topologies = _Box(shapes[0].surface), list[bytes](), list[dict[str, int]]()
+    space, blocks, topologies = _Box(piece.shapes[0].surface), list[bytes](), list[dict[str, int]]()
     painted = list[VertexColours]()
-    for change, shape in zip(piece.changes, shapes, strict=True):
+    for change, shape in zip(piece.changes, piece.shapes, strict=True):
         triangles, _ = triangulate(shape.faces)
         edges = outline_edges(shape.faces)
         topologies.append(
@@ -325,14 +330,14 @@ def _packed(
         for key, scale in maps.items():
             values = MAPS[key][1] * piece.maps[key][0]
             blocks.append(paint.levels(values, scale["high"], _COLOURS).astype(np.uint8).tobytes())
-    layouts = []
-    for time in stored:
-        number, at = sum(change <= time for change in piece.changes) - 1, min(time, piece.times[-1])
-        layouts.append((number, piece.positions(at, len(shapes[number].surface)), at))
-    box = _Box(np.concatenate([positions for _, positions, _ in layouts]))
+    layouts = [piece.positions(time) for time in stored]
+    box = _Box(np.concatenate(layouts))
     before: tuple[int, NDArray[np.uint16], NDArray[np.uint8]] | None = None
-    for number, positions, time in layouts:
-        steps, colours = box.steps(positions), piece.rows(time, painted[number])
+    for time, positions in zip(stored, layouts, strict=True):
+        number = piece.number(time)
+        # Rows of the page's table of colours.
+        colours = painted[number].levels(piece.density(time), piece.scale, _COLOURS).astype(np.uint8)
+        steps = box.steps(positions)
         same = before is not None and before[0] == number
         blocks.append(_planes(steps - before[1] if same and before else steps))
         blocks.append((colours - before[2] if same and before else colours).tobytes())

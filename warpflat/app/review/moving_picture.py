@@ -83,28 +83,19 @@ def _evenly(times: Sequence[int], most: int) -> list[int]:
 
 def _images(pieces: Sequence[FilmPiece], times: Sequence[int], long_side: int) -> list[Image.Image]:
     """Return pictures of all patterns at these frames, RGB, of one size."""
-    shapes = {piece.name: [piece.shape(change) for change in piece.changes] for piece in pieces}
     facets = dict[tuple[int, ...], Facets]()
     views, densities = list[View](), list[FloatArray]()
     for time in times:
-        moments = [min(time, piece.times[-1]) for piece in pieces]
-        numbers = tuple(
-            max(sum(change <= at for change in piece.changes) - 1, 0) for piece, at in zip(pieces, moments, strict=True)
-        )
-        shown = [shapes[piece.name][number] for piece, number in zip(pieces, numbers, strict=True)]
-        counts = np.cumsum([0, *(len(shape.surface) for shape in shown)])
+        numbers = tuple(piece.number(time) for piece in pieces)
+        points = [piece.positions(time) + piece.offset[:2] for piece in pieces]
         if numbers not in facets:
-            faces = [
-                np.where(shape.faces >= 0, shape.faces + first, -1) for shape, first in zip(shown, counts, strict=False)
-            ]
-            joined = np.concatenate(faces).astype(np.int32)
-            facets[numbers] = make_facets(joined, outline_edges(joined))
-        points = [
-            piece.positions(at, len(shape.surface)) + piece.offset[:2]
-            for piece, at, shape in zip(pieces, moments, shown, strict=True)
-        ]
+            shown = [piece.shapes[number].faces for piece, number in zip(pieces, numbers, strict=True)]
+            counts = np.cumsum([0, *map(len, points)])
+            joined = [np.where(faces >= 0, faces + first, -1) for faces, first in zip(shown, counts, strict=False)]
+            together = np.concatenate(joined).astype(np.int32)
+            facets[numbers] = make_facets(together, outline_edges(together))
         views.append(pattern_view(np.concatenate(points), facets[numbers], {}))
-        densities.append(np.concatenate([piece.density(at) for piece, at in zip(pieces, moments, strict=True)]))
+        densities.append(np.concatenate([piece.density(time) for piece in pieces]))
     low = np.min([view.low for view in views], axis=0)
     size = np.max([view.low + view.size for view in views], axis=0) - low
     first, images = pieces[0], []

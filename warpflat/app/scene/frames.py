@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import heapq
 import math
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
-from itertools import chain, pairwise
+from itertools import chain, pairwise, repeat
 from pathlib import Path
 from tempfile import TemporaryFile
 from types import TracebackType
@@ -38,27 +39,81 @@ class Key:
     """A computed layout in a :class:`KeyFile`.
 
     Attributes:
-        place: where its arrays begin in the file [bytes].
+        file, place: where its arrays are, and from which byte on.
+        vertices, faces: its size.
         measures: numbers of this layout.
     """
 
+    file: BinaryIO
     place: int
+    vertices: int
+    faces: int
     measures: Mapping[str, float]
+
+    @property
+    def positions(self) -> NDArray[np.float32]:
+        """The layout, #P by 2 [m]."""
+        return self._read(self.place, 2 * self.vertices).reshape(-1, 2)
+
+    @property
+    def face_energy_density(self) -> NDArray[np.float32]:
+        """Strain energy per area, #F [J/m2]."""
+        return self._read(self.place + 8 * self.vertices, self.faces)
+
+    def _read(self, place: int, count: int) -> NDArray[np.float32]:
+        self.file.seek(place)
+        return np.frombuffer(self.file.read(4 * count), dtype=np.float32)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Frame:
-    """A frame of one piece.
+class Between:
+    """A frame evenly between the computed layouts before and after.
 
     Attributes:
         measures: numbers of this layout.
-        positions: #P by 2, the layout [m]; None of one in between that is not asked for.
-        face_energy_density: #F, strain energy per area [J/m2]; None of a layout evenly between the computed ones before and after.
+        positions: #P by 2, the layout [m]; None if it is not asked for.
     """
 
     measures: Mapping[str, float]
-    positions: NDArray[np.float32] | None = None
-    face_energy_density: NDArray[np.float32] | None = None
+    positions: NDArray[np.float32] | None
+
+
+class KeyFile:
+    """A file without a name, in which computed layouts are kept until the end of the run; used in a ``with`` block.
+
+    A film of a large mesh would fill memory; and until its end neither the scale of its colours nor the time of a layout is known.
+
+    Attributes:
+        film: the file that is made of them.
+        failed: whether a layout could not be kept.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._file = cast(BinaryIO, TemporaryFile(dir=folder))  # noqa: SIM115 (open as long as the film)
+        self.film = folder / "frames.usdc"
+        self.failed = False
+
+    def __enter__(self) -> KeyFile:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with suppress(OSError):  # what a full disk has not taken
+            self._file.close()
+
+    def append(self, positions: FloatArray, density: FloatArray, measures: Mapping[str, float]) -> Key:
+        """Write a layout (#P by 2 [m]) and its energies per face (#F [J/m2]).
+
+        Raises:
+            InputError: there is no room for it.
+        """
+        try:
+            place = self._file.seek(0, os.SEEK_END)
+            for values in (positions, density):
+                self._file.write(np.ascontiguousarray(values, dtype=np.float32).data)
+            self._file.flush()
+        except OSError as error:
+            raise CannotWriteError(f"cannot write {self.film}: {system_reason(error)}") from error
+        return Key(file=self._file, place=place, vertices=len(positions), faces=len(density), measures=dict(measures))
 
 
 @dataclass(kw_only=True, eq=False)
@@ -67,7 +122,6 @@ class FilmStage:
 
     Attributes:
         name: of the solver's stage.
-        vertex_count, face_count: size of the pattern.
         topology: what the first frame of the stage changes: faces, lines, cuts; nothing if the topology goes on.
         keys: the computed layouts, the first and the last of the stage among them.
         still: whether it only shows its one layout.
@@ -75,149 +129,82 @@ class FilmStage:
     """
 
     name: str
-    vertex_count: int
-    face_count: int
     topology: Mapping[str, IntArray | Mapping[str, Any] | Mapping[str, Polylines] | None]
     keys: list[Key] = field(default_factory=list)
     still: bool = False
     last_first_step: int = 0
 
+    def displacement(self, keys: Sequence[Key]) -> float:
+        """Return how far the vertex that moves farthest comes in these layouts from its place at the start of the stage [m]."""
+        first = self.keys[0].positions
+        return max(_largest_move(first, key.positions) for key in keys)
 
-class KeyFile:
-    """A file without a name, in which computed layouts are kept until the end of the run; used in a ``with`` block.
-
-    Attributes:
-        film: the file that is made of them.
-        failed: whether a layout could not be kept.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self._file = cast(BinaryIO, TemporaryFile(dir=folder, buffering=0))  # noqa: SIM115 (open as long as the film)
-        self._end = 0
-        self.film = folder / "frames.usdc"
-        self.failed = False
-
-    def __enter__(self) -> KeyFile:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._file.close()
-
-    def append(self, positions: FloatArray, density: FloatArray, measures: Mapping[str, float]) -> Key:
-        """Write a layout (#P by 2 [m]) and its energies per face (#F [J/m2]).
-
-        Raises:
-            InputError: there is no room for it.
-        """
-        key = Key(place=self._end, measures=dict(measures))
-        try:
-            self._file.seek(self._end)
-            for values in (positions, density):
-                left = memoryview(np.ascontiguousarray(values, dtype=np.float32).tobytes())
-                while left:
-                    # Unbuffered, a write may take only a part.
-                    written = self._file.write(left)
-                    self._end, left = self._end + written, left[written:]
-        except OSError as error:
-            reason = system_reason(error)
-            raise CannotWriteError(f"cannot write {self.film}: {reason}") from error
-        return key
-
-    def positions(self, stage: FilmStage, key: Key) -> NDArray[np.float32]:
-        """Read the layout of a key, #P by 2 [m]."""
-        return self._read(key.place, 2 * stage.vertex_count).reshape(-1, 2)
-
-    def density(self, stage: FilmStage, key: Key) -> NDArray[np.float32]:
-        """Read the energies of a key, #F [J/m2]."""
-        return self._read(key.place + 8 * stage.vertex_count, stage.face_count)
-
-    def _read(self, place: int, count: int) -> NDArray[np.float32]:
-        self._file.seek(place)
-        content = bytearray()
-        while len(content) < 4 * count:
-            content += self._file.read(4 * count - len(content))
-        return np.frombuffer(content, dtype=np.float32)
-
-    def displacement(self, stage: FilmStage, keys: Sequence[Key]) -> float:
-        """Return how far the vertex that moves farthest comes in these layouts from its place at the start of a stage [m]."""
-        first = self.positions(stage, stage.keys[0])
-        return max(_largest_move(first, self.positions(stage, key)) for key in keys)
-
-    def thin(self, stage: FilmStage, spacing: float) -> tuple[list[Key], list[float]]:
+    def thin(self, spacing: float) -> tuple[list[Key], list[float]]:
         """Return keys at least `spacing` apart [m], the first and the last among them, and the distances between them [m]."""
-        kept, at = [stage.keys[0]], self.positions(stage, stage.keys[0])
+        kept, at = [self.keys[0]], self.keys[0].positions
         distances = list[float]()
-        for key in stage.keys[1:]:
-            positions = self.positions(stage, key)
+        for key in self.keys[1:-1]:
+            positions = key.positions
             distance = _largest_move(at, positions)
-            if distance >= spacing and key is not stage.keys[-1]:
+            if distance >= spacing:
                 kept.append(key)
                 distances.append(distance)
                 at = positions
-        if len(stage.keys) > 1:
-            last = self.positions(stage, stage.keys[-1])
+        if len(self.keys) > 1:
+            last = self.keys[-1].positions
             if distances and _largest_move(at, last) < 0.5 * spacing:
                 # The end replaces a key that lies close to it.
                 kept.pop()
                 distances.pop()
-                at = self.positions(stage, kept[-1])
-            kept.append(stage.keys[-1])
+                at = kept[-1].positions
+            kept.append(self.keys[-1])
             distances.append(_largest_move(at, last))
         return kept, distances
 
-    def place_frames(self, stage: FilmStage, *, steps: float, at_least: int, most_keys: int) -> tuple[list[Key], int]:
+    def place_frames(self, *, steps: float, at_least: int, most_keys: int) -> tuple[list[Key], int]:
         """Choose the keys that are shown, and the number of frames.
 
         Args:
-            stage: of the film.
             steps: into so many frames the stage's largest displacement is parted, or more.
             at_least: frames.
             most_keys: at least 2.
         """
-        reach = self.displacement(stage, stage.keys)
+        reach = self.displacement(self.keys)
         if reach <= _STILL:
-            return [stage.keys[0], stage.keys[-1]], at_least
+            return [self.keys[0], self.keys[-1]], at_least
         spacing = 2.0 * reach / steps
         while True:
-            keys, distances = self.thin(stage, spacing)
-            shown = max(self.displacement(stage, keys), _STILL)  # the layout farthest out may be left out
+            keys, distances = self.thin(spacing)
+            shown = max(self.displacement(keys), _STILL)  # the layout farthest out may be left out
             wanted = 1 + sum(math.ceil(steps * distance / shown) for distance in distances)
             if len(keys) <= 2 or (len(keys) <= most_keys and wanted <= 4 * at_least):
                 return keys, max(wanted, at_least)
             spacing *= 1.5
 
-    def frames(self, stage: FilmStage, keys: Sequence[Key], number: int, *, between: bool) -> Iterator[Frame]:
-        """Yield `number` frames along the path through these keys, each of which is one of the frames.
 
-        Those between two keys have no energies of their own: the way from one to the next is straight and even. Their layouts are there
-        if `between` asks for them.
-        """
-        distances = [_largest_move(self.positions(stage, a), self.positions(stage, b)) for a, b in pairwise(keys)]
-        yield self._computed(stage, keys[0])
-        counts = spread(distances, number - 1)
-        for (begin, end), count in zip(pairwise(keys), counts, strict=True):
-            for step in range(1, count):
-                share = step / count
-                measures = {
-                    key: (1.0 - share) * value + share * end.measures[key]
-                    for key, value in begin.measures.items()
-                    if key in end.measures
-                }
-                first, last = (self.positions(stage, key) if between else None for key in (begin, end))
-                layout = None if first is None or last is None else first + np.float32(share) * (last - first)
-                yield Frame(positions=layout, measures=measures)
-            yield self._computed(stage, end)
-        for _ in range(number - 1 - sum(counts)):
-            yield self._computed(stage, keys[-1])
+def frames_along(keys: Sequence[Key], number: int, *, between: bool) -> Iterator[Key | Between]:
+    """Yield `number` frames along the path through these keys, each of which is one of the frames.
 
-    def _computed(self, stage: FilmStage, key: Key) -> Frame:
-        return Frame(
-            positions=self.positions(stage, key),
-            face_energy_density=self.density(stage, key),
-            measures=key.measures,
-        )
+    The way from one key to the next is straight and even. The layouts of frames there are made if `between` asks for them.
+    """
+    distances = [_largest_move(a.positions, b.positions) for a, b in pairwise(keys)]
+    yield keys[0]
+    counts = spread(distances, number - 1)
+    for (begin, end), count in zip(pairwise(keys), counts, strict=True):
+        for step in range(1, count):
+            share = step / count
+            measures = {
+                key: (1.0 - share) * value + share * end.measures[key]
+                for key, value in begin.measures.items()
+                if key in end.measures
+            }
+            layout = None
+            if between:
+                first = begin.positions
+                layout = first + np.float32(share) * (end.positions - first)
+            yield Between(positions=layout, measures=measures)
+        yield end
+    yield from [keys[-1]] * (number - 1 - sum(counts))
 
 
 def spread(distances: Sequence[float], number: int) -> list[int]:
@@ -293,9 +280,7 @@ class Film:
         self._surfaces = {surface.name: surface for surface in surfaces}
         vertices = sum(len(surface.vertices) for surface in surfaces)
         self._all_stored = not output.compact_film and vertices * max(output.frames, 1) <= _MOST_STORED
-        self.recorders = {
-            name: FrameRecorder(None, surface, self._schedule) for name, surface in self._surfaces.items()
-        }
+        self.recorders = {name: FrameRecorder(surface, self._schedule) for name, surface in self._surfaces.items()}
 
     def _schedule(self) -> FrameSchedule:
         return FrameSchedule(self._output, at_most=self._most)
@@ -309,8 +294,8 @@ class Film:
         if self.wanted:
             with optional_file(self._folder / "frames.usdc", []), ExitStack() as stack:
                 self._keys = stack.enter_context(KeyFile(self._folder))
-                for name, surface in self._surfaces.items():
-                    self.recorders[name] = FrameRecorder(self._keys, surface, self._schedule)
+                for recorder in self.recorders.values():
+                    recorder.keys = self._keys
                 stack.push(self._write_at_end)
                 self._stack = stack.pop_all()
         return self
@@ -331,9 +316,8 @@ class Film:
             # The upper end of the colours: by the last frames, or by the first ones if the pieces end without strain.
             for at in (-1, 0):
                 ends = [recorder.stages[at] for recorder in self.recorders.values()]
-                scale = film_scale(
-                    list(self._surfaces.values()), [self._keys.density(stage, stage.keys[at]) for stage in ends]
-                )
+                densities = [stage.keys[at].face_energy_density for stage in ends]
+                scale = film_scale(list(self._surfaces.values()), densities)
                 if scale > SMALLEST_SCALE:
                     break
             with FrameWriter(path, scale=scale) as writer:
@@ -362,24 +346,23 @@ class Film:
                 for number in range(max(len(stages) for stages in pieces.values())):
                     shots = {name: self._shot(stages, number) for name, stages in pieces.items()}
                     count = max(wanted for _, _, wanted in shots.values())
-                    frames = {name: self._frames(stage, keys, count) for name, (stage, keys, _) in shots.items()}
+                    frames = {name: self._frames(shot[1], count) for name, shot in shots.items()}
                     for frame in range(count):
                         for name, shot in shots.items():
                             stage = shot[0]
                             begins = frame == 0 and number < len(pieces[name])
                             shown = next(frames[name])
+                            in_steps = 0 < shown.measures.get("step", 0) <= stage.last_first_step
                             measures = {
-                                "stage": _STEPS
-                                if 0 < shown.measures.get("step", 0) <= stage.last_first_step
-                                else stage.name,
+                                "stage": _STEPS if in_steps else stage.name,
                                 "stage_number": number,
-                                "interpolated": shown.face_energy_density is None,
+                                "interpolated": isinstance(shown, Between),
                                 **{
                                     key: round(value) if key in _COUNTS else value
                                     for key, value in shown.measures.items()
                                 },
                             }
-                            if shown.positions is None or shown.face_energy_density is None:
+                            if isinstance(shown, Between):
                                 writer.write_between(name, shown.positions, measures)
                                 continue
                             writer.write(
@@ -403,22 +386,18 @@ class Film:
         if stage.still:
             return stage, stage.keys, max(round(_LINE * self._output.frames), 1)
         share = 1.0 if number == 0 else _LATER
-        keys, count = self._keys.place_frames(
-            stage,
+        keys, count = stage.place_frames(
             steps=_PARTS * self._output.frames,
             at_least=max(math.ceil(share * self._output.frames), 2),
             most_keys=self._most,
         )
         return stage, keys, count
 
-    def _frames(self, stage: FilmStage, keys: Sequence[Key], count: int) -> Iterator[Frame]:
+    def _frames(self, keys: Sequence[Key], count: int) -> Iterator[Key | Between]:
         if self._output.frame_every is None:
-            return self._keys.frames(stage, keys, count, between=self._all_stored)
+            return frames_along(keys, count, between=self._all_stored)
         # Steps are shown as they are; whoever is at rest earlier waits.
-        return chain.from_iterable(
-            self._keys.frames(stage, [key], 1 if key is not keys[-1] else count - len(keys) + 1, between=False)
-            for key in keys
-        )
+        return chain(keys, repeat(keys[-1], count - len(keys)))
 
 
 #: Stage of the paper's steps with which a relaxation begins (`warpflat.flat.flattening.progress`, which loads the solver).
@@ -426,17 +405,21 @@ _STEPS = "steps"
 
 
 class FrameRecorder:
-    """Keeps the layouts of one piece; a callback of `flatten` and of `cut`."""
+    """Keeps the layouts of one piece; a callback of `flatten` and of `cut`.
 
-    def __init__(self, keys: KeyFile | None, surface: Surface, new_schedule: Callable[[], FrameSchedule]) -> None:
+    Attributes:
+        stages: with the layouts.
+        keys: where layouts are kept; None to keep none.
+    """
+
+    def __init__(self, surface: Surface, new_schedule: Callable[[], FrameSchedule]) -> None:
         """
         Args:
-            keys: where layouts are kept; None to keep none.
             surface: the piece, uncut.
             new_schedule: makes the schedule of a stage.
         """
         self.stages = list[FilmStage]()
-        self._keys = keys
+        self.keys: KeyFile | None = None
         self._surface = surface
         self._new_schedule = new_schedule
         self._schedule = new_schedule()
@@ -499,14 +482,14 @@ class FrameRecorder:
     @contextmanager
     def _recording(self) -> Iterator[bool]:
         """Tell whether layouts are kept; after an error in the block the film is left out."""
-        if self._keys is None or self._keys.failed:
+        if self.keys is None or self.keys.failed:
             yield False
             return
-        self._keys.failed = True  # until the block has ended well
+        self.keys.failed = True  # until the block has ended well
         kept = list[str]()
-        with optional_file(self._keys.film, kept):
+        with optional_file(self.keys.film, kept):
             yield True
-        self._keys.failed = not kept
+        self.keys.failed = not kept
 
     def _begin_stage(self, name: str, surface: Surface, positions: FloatArray, *, still: bool = False) -> None:
         self._schedule = self._new_schedule()
@@ -521,16 +504,12 @@ class FrameRecorder:
                 ]
                 for plan in self._plans
             }
-        self.stages.append(
-            FilmStage(
-                name=name, vertex_count=len(positions), face_count=len(surface.faces), topology=topology, still=still
-            )
-        )
+        self.stages.append(FilmStage(name=name, topology=topology, still=still))
         self._first, self._ended = positions, False
 
     def _keep(self, positions: FloatArray, density: FloatArray, measures: Mapping[str, float]) -> None:
-        assert self._keys is not None
-        self.stages[-1].keys.append(self._keys.append(positions, density, measures))
+        assert self.keys is not None
+        self.stages[-1].keys.append(self.keys.append(positions, density, measures))
         self._last = positions
 
 

@@ -112,6 +112,13 @@ class FormGarment(Garment):
         return pattern_girths(self.mannequin, self.form, self.positions)
 
     @property
+    def body_girths(self) -> Mapping[str, float]:
+        """Girths of the body by level, and of the "head" where that is known [m]."""
+        head = self.mannequin.extremity("head")
+        levels = {name: level.girth for name, level in self.mannequin.levels().items()}
+        return levels if head is None else {**levels, "head": head}
+
+    @property
     def drawn_body(self) -> Body:
         """The body on which a picture shows it first."""
         from warpflat.pattern import Body

@@ -153,6 +153,11 @@ class Garment:
         return {}
 
     @property
+    def body_girths(self) -> Mapping[str, float]:
+        """Girths of the body by level, and of the "head" where that is known [m]; empty without one."""
+        return {}
+
+    @property
     def drawn_body(self) -> Body | None:
         """The body on which a picture shows it first."""
         return None

@@ -4,26 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from warpflat.core import arc_lengths
-from warpflat.pattern import Piece, Seam, SeamSide
+from warpflat.core import FloatArray, arc_lengths
+from warpflat.flat import mirror_plane
+from warpflat.pattern import Pattern, Piece, Seam, SeamSide
 
 if TYPE_CHECKING:
     from warpflat.garment.construction.garment import Garment
 
-__all__ = ["MirrorPair", "evened", "find_mirror_pairs", "sew_mirror_pairs"]
+__all__ = ["draw_pairs_once", "evened"]
+
+AnyGarment = TypeVar("AnyGarment", bound="Garment")
 
 #: Edges of a pair that is cut by one pattern agree in length, up to each of their points, within this [m].
 SAME_LENGTH = 5e-5
+# A plane of symmetry whose normal has this cosine to x at least is that between left and right.
+_UPRIGHT = 0.8
 # What rests farther [m] from the mean of itself and its mirror image is not meant to be symmetric.
 _EVEN = 2.5e-4
 
 
 @dataclass(frozen=True, kw_only=True)
-class MirrorPair:
+class _MirrorPair:
     """A piece that is cut by another one's pattern, turned over.
 
     Attributes:
@@ -37,7 +42,7 @@ class MirrorPair:
     edges: Mapping[str, str]
 
 
-def evened(garment: Garment) -> Garment:
+def evened(garment: AnyGarment) -> AnyGarment:
     """Return a garment with each piece as the mean of itself and its mirror image, if all pieces have one.
 
     A relaxation ends as far to the left or right of its symmetric rest as its tolerance leaves, some hundredths of a millimetre.
@@ -57,44 +62,73 @@ def evened(garment: Garment) -> Garment:
     return replace(garment, pieces=pieces)
 
 
-def find_mirror_pairs(
-    garments: Mapping[str, Garment],
-    pieces: Mapping[str, Sequence[Piece]],
-    seams: Sequence[Seam],
-    unlike: Collection[str] = (),
-) -> tuple[MirrorPair, ...]:
-    """Find pieces that are mirror images in every size, with equal edges, and whose seams are mirror images too.
+def draw_pairs_once(
+    pattern: Pattern, garments: Mapping[str, Garment], unlike: Collection[str] = ()
+) -> tuple[Pattern, tuple[str, ...]]:
+    """Return the pattern with one piece drawn for two that are mirror images, and a note on each such piece.
+
+    They hang about x = 0, the plane at which what is cut turned over is mirrored. A mesh may stand beside that plane, and lean; one that
+    faces sideways is left as it is.
 
     Args:
+        pattern: all pieces and seams.
         garments: flattened, by size.
-        pieces: their patterns, all of them.
-        seams: between these.
         unlike: pieces that are going to be cut unlike their mirror images.
     """
+    from scipy.spatial.transform import Rotation
+
+    pairs = _find_pairs(pattern, garments, unlike)
+    if not pairs:
+        return pattern, ()
+    (garment, *_), points, images = garments.values(), list[FloatArray](), list[FloatArray]()
+    for pair in pairs:
+        partners = garment.mirror_vertices(pair.of, pair.name)
+        assert partners is not None  # _find_pairs has found them
+        points.append(garment.pieces[pair.of].network.surface.vertices)
+        images.append(garment.pieces[pair.name].network.surface.vertices[partners])
+    normal, off = mirror_plane(np.concatenate(points), np.concatenate(images))
+    turn = Rotation.align_vectors([1.0, 0.0, 0.0], normal)[0].as_matrix() if normal[0] > _UPRIGHT else None
+    twice, left_out = {pair.of for pair in pairs}, {pair.name for pair in pairs}
+
+    def drawn(piece: Piece) -> Piece:
+        if turn is not None and piece.placement is not None:
+            hung = turn @ piece.placement - np.outer([off, 0.0, 0.0], [0.0, 0.0, 1.0])
+            piece = replace(piece, placement=hung)
+        return replace(piece, quantity=2 * piece.quantity) if piece.name in twice else piece
+
+    pieces = {
+        size: [drawn(piece) for piece in row if piece.name not in left_out] for size, row in pattern.pieces.items()
+    }
+    notes = tuple(f"{pair.of}: cut twice, once mirrored, it serves for {pair.name} too" for pair in pairs)
+    return replace(pattern, pieces=pieces, seams=_sewn_once(pattern.seams, pairs)), notes
+
+
+def _find_pairs(pattern: Pattern, garments: Mapping[str, Garment], unlike: Collection[str]) -> tuple[_MirrorPair, ...]:
+    """Find pieces that are mirror images in every size, with equal edges, and whose seams are mirror images too."""
     every = [set(garment.pairs) for garment in garments.values()]
-    found: list[MirrorPair] = []
+    found: list[_MirrorPair] = []
     for first, second in next(iter(garments.values())).pairs:
         if first in unlike or second in unlike or not all((first, second) in pairs for pairs in every):
             continue
-        matched = [_matching_edges(garments[size], pieces[size], first, second) for size in garments]
+        matched = [_matching_edges(garments[size], pattern.pieces[size], first, second) for size in garments]
         if matched[0] is not None and all(edges == matched[0] for edges in matched):
-            found.append(MirrorPair(name=second, of=first, edges=matched[0]))
+            found.append(_MirrorPair(name=second, of=first, edges=matched[0]))
     # A piece that is sewn differently needs notches of its own; leaving it out may make others differ.
     while True:
         by_name = {pair.name: pair for pair in found}
         different = {
             part.piece
-            for seam in seams
+            for seam in pattern.seams
             for side in seam.sides
             for part, drawn in zip(side, _replaced(side, by_name), strict=True)
-            if drawn.mirrored and _mirror_seam(drawn, seams, by_name) is None
+            if drawn.mirrored and _mirror_seam(drawn, pattern.seams, by_name) is None
         }
         if not different:
             return tuple(found)
         found = [pair for pair in found if pair.name not in different]
 
 
-def sew_mirror_pairs(seams: Sequence[Seam], mirror_pairs: Sequence[MirrorPair]) -> tuple[Seam, ...]:
+def _sewn_once(seams: Sequence[Seam], mirror_pairs: Sequence[_MirrorPair]) -> tuple[Seam, ...]:
     """Replace the edges of pieces that are not drawn by those of the pieces that are.
 
     Such a seam runs as its mirror image does, so that the notches of one are those of the other.
@@ -108,7 +142,7 @@ def sew_mirror_pairs(seams: Sequence[Seam], mirror_pairs: Sequence[MirrorPair]) 
             sewn.append(seam)
             continue
         image = _mirror_seam(mirrored[0], seams, by_name)
-        assert image is not None  # find_mirror_pairs sees to it
+        assert image is not None  # _find_pairs sees to it
         other, place = image
         ease, (first, last) = seam.ease, seam.eased
         if next(number for number in (0, 1) if mirrored[0] in sides[number]) != place:
@@ -142,7 +176,7 @@ def _matching_edges(garment: Garment, pieces: Sequence[Piece], first: str, secon
 
 
 def _mirror_seam(
-    side: SeamSide, seams: Sequence[Seam], mirror_pairs: Mapping[str, MirrorPair]
+    side: SeamSide, seams: Sequence[Seam], mirror_pairs: Mapping[str, _MirrorPair]
 ) -> tuple[Seam, int] | None:
     """Return the seam at which the drawn edge is sewn itself, and the side of it."""
     for seam in seams:
@@ -152,7 +186,7 @@ def _mirror_seam(
     return None
 
 
-def _replaced(side: Sequence[SeamSide], mirror_pairs: Mapping[str, MirrorPair]) -> tuple[SeamSide, ...]:
+def _replaced(side: Sequence[SeamSide], mirror_pairs: Mapping[str, _MirrorPair]) -> tuple[SeamSide, ...]:
     """Replace the edges of pieces that are not drawn."""
     return tuple(
         SeamSide(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ from warpflat.core import (
     InputError,
     IntArray,
     find_unused_name,
+    off_line,
     optional_step,
     polyline_length,
     quote_value,
@@ -30,7 +31,6 @@ from warpflat.flat import (
     border_loops,
     fish_eye_measure,
     join_labels,
-    mirror_plane,
     open_length,
     pull_back,
     pull_back_eye,
@@ -49,7 +49,7 @@ from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.form_plan import EdgePlan, check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.construction.line_drawing import describe_worn
 from warpflat.garment.construction.mark_openings import mark_openings
-from warpflat.garment.construction.mirror_pieces import MirrorPair, evened, find_mirror_pairs, sew_mirror_pairs
+from warpflat.garment.construction.mirror_pieces import draw_pairs_once, evened
 from warpflat.garment.construction.openings import one_sided, place_opening
 from warpflat.garment.construction.pockets import add_pockets
 from warpflat.garment.construction.strips import CLOTH_WIDTH
@@ -77,6 +77,7 @@ from warpflat.pattern import (
 if TYPE_CHECKING:
     from warpflat.flat import BorderSeam, Crack, Flattening, Surface
     from warpflat.garment.construction.garment import Garment
+    from warpflat.garment.construction.openings import OpeningPart
     from warpflat.garment.construction.sewn import Stitching
     from warpflat.garment.mannequin.pieces import FormPiece
 
@@ -99,8 +100,27 @@ LACKING, _LACKING = "not sewn in the pattern:", 1e-3
 _NO_DRAWING = "the guide has no line drawing of the garment"
 # What lines along a border are called that nobody has named, with the numbers of their stretches.
 _UNNAMED = re.compile(r"(to .+|edge|seam)(_\d+)?( \d+)*")
-# A plane of symmetry whose normal has this cosine to x at least is that between left and right.
-_UPRIGHT = 0.8
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Drawn:
+    """What a source has drawn: all pieces, each whole, and the seams between them.
+
+    Attributes:
+        pattern: pieces and seams.
+        notes: what was chosen on the way, one sentence each.
+        laid: by size, the garment as its pieces were drawn; empty where every piece is cut as it is.
+        unlike: pieces that are going to be cut unlike their mirror images.
+        placed: by size and opening, the seams that it runs along.
+        alike: how the names of pieces begin that may be drawn once where they are equal.
+    """
+
+    pattern: Pattern
+    notes: tuple[str, ...]
+    laid: Mapping[str, Garment]
+    unlike: Collection[str] = ()
+    placed: Mapping[str, Sequence[Sequence[OpeningPart]]] = field(default_factory=dict)
+    alike: str = ""
 
 
 def pattern_of_garment(
@@ -134,61 +154,106 @@ def pattern_of_garment(
             crosses itself, or the sizes differ in their edges.
     """
     rules, sample = rules or EdgeRules(), next(iter(garments.values()))
-    if not isinstance(sample, FormGarment):
-        worn = {own for pair in sample.stitching if pair.pieces[0] != pair.pieces[1] for own in pair.pieces}
+    forms = {size: garment for size, garment in garments.items() if isinstance(garment, FormGarment)}
+    if forms:
+        drawn = _drawn_on_forms(forms, name, rules, sample_size)
+    else:
+        drawn = _drawn_of_meshes(sample, name, rules, twice=twice)
+    pattern, notes, laid = drawn.pattern, drawn.notes, drawn.laid
+    if laid:
+        pattern, pairs = draw_pairs_once(pattern, laid, drawn.unlike)
+        notes += pairs
+    pattern = mark_openings(pattern, sample.openings, drawn.placed)
+    gaps = [
+        row[0].seam
+        for row, opening in zip(drawn.placed.get(pattern.sample, ()), sample.openings, strict=True)
+        if opening.opens_the_top
+    ]
+    stands = [
+        Stand(
+            piece=piece.name, edge=edge.name, width=opening.buttons.facing_width,
+            grown_on=opening.buttons.facing == "grown-on",
+        )
+        for opening in sample.openings
+        if opening.buttons is not None
+        for piece in pattern.pieces[pattern.sample]
+        for edge in piece.edges
+        if edge.name == f"{opening.line} {STAND}"
+    ]  # fmt: skip
+    rises = hem_rises(pattern, sample.finishing)
+    with optional_step("the pattern has no finishing"):
+        girths = {size: garment.body_girths for size, garment in laid.items()}
+        pattern = finish_edges(
+            pattern, sample.finishing, gaps=gaps, stands=stands, girths=girths, cloth_width=cloth_width
+        )
+    with optional_step("the pattern has no pockets"):
+        pattern = with_flies(add_pockets(pattern, sample.pockets))
+    if laid and not rises:
+        # Equal pieces stay equal, unless a slanted hem cuts them.
+        pattern, equal = draw_equal_pieces_once(pattern, called=drawn.alike)
+        notes += equal
+    # Seams along lines without a name of the user's are called by the pieces that they join.
+    seams, taken = list[Seam](), {seam.name for seam in pattern.seams if not _UNNAMED.fullmatch(seam.name)}
+    for seam in pattern.seams:
+        if _UNNAMED.fullmatch(seam.name):
+            seam = replace(seam, name=find_unused_name(joint_words(seam), taken))
+            taken.add(seam.name)
+        seams.append(seam)
+    pattern = replace(pattern, seams=tuple(seams))
+    if sample.as_cut is not None:
+        pattern = _through_vertices(pattern)
+    if laid:
+        with optional_step(_NO_DRAWING, is_needed=False):
+            worn = describe_worn(laid, pattern.sample, rises, pattern.pieces[pattern.sample])
+            pattern = replace(pattern, worn=worn)
+    return pattern, notes
+
+
+def _drawn_of_meshes(sample: Garment, name: str, rules: EdgeRules, *, twice: bool) -> _Drawn:
+    """Draw the pieces of meshes; those that are sewn along a part of an edge alone are parted there, if that sews them."""
+    worn = {own for pair in sample.stitching if pair.pieces[0] != pair.pieces[1] for own in pair.pieces}
+    ends: dict[str, set[int]] = {}
+    for _ in range(2):
         pattern, notes = pattern_of_surface(
-            list(sample.parts.values()), name=name, rules=rules, seams=sample.border_seams, worn=worn
+            list(sample.parts.values()), name=name, rules=rules, seams=sample.border_seams, ends=ends, worn=worn
         )
         lacking = _lacking_seams(sample, pattern)
-        if lacking:
-            # A seam that ends within an edge of one side alone: that edge is parted there.
-            ends: dict[str, set[int]] = {}
-            for pair, run in lacking:
-                for each, along in zip(pair.pieces, pair.vertices, strict=True):
-                    ends.setdefault(each, set()).update(along[[run[0], run[-1] + 1]].tolist())
-            pattern, notes = pattern_of_surface(
-                list(sample.parts.values()), name=name, rules=rules, seams=sample.border_seams, ends=ends, worn=worn
-            )
-            lacking = _lacking_seams(sample, pattern)
+        if not lacking or ends:
+            break
+        # A seam that ends within an edge of one side alone: that edge is parted there.
         for pair, run in lacking:
-            chain, flat = pair.vertices[0][run[0] : run[-1] + 2], sample.pieces[pair.pieces[0]]
-            place = ", ".join(f"{100 * x:.0f}" for x in flat.network.surface.vertices[chain[len(chain) // 2]] + 0.0)
-            notes += (
-                f"{LACKING} {1e3 * polyline_length(flat.positions[chain]):.0f} mm of the seam of "
-                f"{' and '.join(dict.fromkeys(pair.pieces))} about ({place}) cm: no edges of them fit each other there",
-            )
-        # Where a side was cut longer than the other, as on a band that is stretched, it is eased in.
-        as_laid = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased}
-        stretched = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased and np.any(pair.ratio != 1.0)}
-        pattern = replace(
-            pattern,
-            seams=[
-                replace(_eased(seam, pattern, stretched), as_laid=_pieces_of(seam) in as_laid) for seam in pattern.seams
-            ],
+            for each, along in zip(pair.pieces, pair.vertices, strict=True):
+                ends.setdefault(each, set()).update(along[[run[0], run[-1] + 1]].tolist())
+    for pair, run in lacking:
+        chain, flat = pair.vertices[0][run[0] : run[-1] + 2], sample.pieces[pair.pieces[0]]
+        place = ", ".join(f"{100 * x:.0f}" for x in flat.network.surface.vertices[chain[len(chain) // 2]] + 0.0)
+        notes += (
+            f"{LACKING} {1e3 * polyline_length(flat.positions[chain]):.0f} mm of the seam of "
+            f"{' and '.join(dict.fromkeys(pair.pieces))} about ({place}) cm: no edges of them fit each other there",
         )
-        if not twice or len(sample.pieces) == 1 or sample.parts.keys() != sample.pieces.keys():
-            pattern = _named_by_pieces(pattern)
-            return (pattern if sample.as_cut is None else _through_vertices(pattern)), notes
-        with optional_step(_NO_DRAWING, is_needed=False):
-            pattern = replace(pattern, worn=describe_worn(dict.fromkeys(pattern.pieces, sample), pattern.sample))
-        pairs = find_mirror_pairs(dict.fromkeys(pattern.pieces, sample), pattern.pieces, pattern.seams)
-        if pairs:
-            pattern = _hung_upright(pattern, sample, pairs)
-        drawn, more = _drawn_once(pattern.pieces, pairs)
-        pattern = replace(pattern, pieces=drawn, seams=sew_mirror_pairs(pattern.seams, pairs))
-        pattern, equal = draw_equal_pieces_once(pattern)
-        pattern = _named_by_pieces(pattern)
-        pattern = pattern if sample.as_cut is None else _through_vertices(pattern)
-        return pattern, (*notes, *more, *equal)
-    forms = {size: garment.form for size, garment in garments.items() if isinstance(garment, FormGarment)}
-    form = sample.form
+    # Where a side was cut longer than the other, as on a band that is stretched, it is eased in.
+    as_laid = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased}
+    stretched = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased and np.any(pair.ratio != 1.0)}
+    seams = [replace(_eased(seam, pattern, stretched), as_laid=_pieces_of(seam) in as_laid) for seam in pattern.seams]
+    drawn_for_others = twice and len(sample.pieces) > 1 and sample.parts.keys() == sample.pieces.keys()
+    return _Drawn(
+        pattern=replace(pattern, seams=seams), notes=notes,
+        laid=dict.fromkeys(pattern.pieces, sample) if drawn_for_others else {},
+    )  # fmt: skip
+
+
+def _drawn_on_forms(
+    garments: Mapping[str, FormGarment], name: str, rules: EdgeRules, sample_size: str | None
+) -> _Drawn:
+    """Draw the pieces of forms, in every size, with what of openings and hems is cut into one side of the body alone."""
+    sample = next(iter(garments.values()))
     if sample.wished is not None:
-        ease, eased = measure_ease(form, sample.wished, sample.positions)
+        ease, eased = measure_ease(sample.form, sample.wished, sample.positions)
         rules = replace(rules, ease={**ease, **rules.ease, **{seam: ease[seam] for seam in eased}}, eased=eased)
-    plans = {size: plan_form(each, rules) for size, each in forms.items()}
+    plans = {size: plan_form(garment.form, rules) for size, garment in garments.items()}
     plan = next(iter(plans.values()))
     # Relaxation keeps a piece upright, but not in its place: the lower ends of its datum lie on each other in all sizes.
-    laid, evened_sample = {}, evened(sample)
+    laid, evened_sample = dict[str, FormGarment](), evened(sample)
     for size, garment in garments.items():
         moved, even = {}, evened(garment)
         for piece, flat in even.pieces.items():
@@ -196,31 +261,27 @@ def pattern_of_garment(
             offset = there.positions[there.datum[0]] - flat.positions[flat.datum[0]]
             moved[piece] = replace(flat, positions=np.round(flat.positions + offset, _DECIMALS))
         laid[size] = replace(even, pieces=moved)
-    garments, sample = laid, next(iter(laid.values()))
     # Half pieces whose fold strays from straight in some size, and by how much [m] at most.
     bent: dict[str, float] = {}
-    for size, garment in garments.items():
+    for garment in laid.values():
         for piece, flat in garment.pieces.items():
-            edge = forms[size].pieces[piece].fold
-            if edge is None:
-                continue
-            points = flat.positions[forms[size].pieces[piece].edges[edge]]
-            span, away = points[-1] - points[0], points - points[0]
-            length = max(float(np.linalg.norm(span)), 1e-12)
-            stray = float(np.abs(away[:, 0] * span[1] - away[:, 1] * span[0]).max()) / length
-            if stray > max(FOLD_STRAIGHT, bent.get(piece, 0.0)):
-                bent[piece] = stray
-    folds = {piece: edge for piece, edge in find_fold_lines(form, plan).items() if piece not in bent}
-    opened = {piece: each.fold for piece, each in form.pieces.items() if each.fold and piece not in folds}
-    for flat in (garment.pieces[piece] for garment in garments.values() for piece in folds):
+            edge = garment.form.pieces[piece].fold
+            if edge is not None:
+                points = flat.positions[garment.form.pieces[piece].edges[edge]]
+                stray = float(off_line(points, points[[0, -1]]).max())
+                if stray > max(FOLD_STRAIGHT, bent.get(piece, 0.0)):
+                    bent[piece] = stray
+    folds = {piece: edge for piece, edge in find_fold_lines(sample.form, plan).items() if piece not in bent}
+    opened = {piece: each.fold for piece, each in sample.form.pieces.items() if each.fold and piece not in folds}
+    for flat in (garment.pieces[piece] for garment in laid.values() for piece in folds):
         check_fold_grain(folds, flat.grain_angle)
     pieces: dict[str, tuple[Piece, ...]] = {}
-    for size, garment in garments.items():
-        pleats = pleat_depths(forms[size])
+    for size, garment in laid.items():
+        pleats = pleat_depths(garment.form)
         pieces[size] = tuple(
             _form_piece(
                 flat,
-                forms[size].pieces[piece],
+                garment.form.pieces[piece],
                 plans[size].edges[piece],
                 rules=rules,
                 size=size,
@@ -238,100 +299,23 @@ def pattern_of_garment(
         side = (SeamSide(piece=piece, edge=edge),)
         seams = (*seams, Seam(name=find_unused_name(title, {seam.name for seam in seams}), sides=(side, side)))
     placed = {
-        size: [place_opening(forms[size], opening, garment.positions) for opening in garment.openings]
-        for size, garment in garments.items()
+        size: [place_opening(garment.form, opening, garment.positions) for opening in garment.openings]
+        for size, garment in laid.items()
     }
     # One pattern cannot serve for both sides where an opening is cut into just one of them, or a hem slants to one side.
     cut = one_sided(sample.openings)
-    parted = {
-        part.seam
-        for opening, parts in zip(sample.openings, placed[next(iter(garments))], strict=True)
-        for part in parts
-        if opening in cut
-    }
+    rows = zip(sample.openings, placed[next(iter(garments))], strict=True)
+    parted = {part.seam for opening, parts in rows for part in parts if opening in cut}
     unlike = {side.piece for seam in seams if seam.name in parted for row in seam.sides for side in row}
     slanted = {wish.edge for wish in sample.finishing if wish.is_one_sided}
     unlike |= {piece.name for piece in pieces[next(iter(pieces))] for edge in piece.edges if edge.name in slanted}
-    pairs = find_mirror_pairs(garments, pieces, seams, unlike)
-    drawn, notes = _drawn_once(pieces, pairs)
-    notes += tuple(
+    notes = tuple(
         f"{piece}: {opened[piece]} bends by {stray * 1000:.1f} mm and cannot lie on the fold: cut twice, with a seam there"
         for piece, stray in bent.items()
     )
-    pattern = Pattern(name=name, pieces=drawn, seams=sew_mirror_pairs(seams, pairs), sample_size=sample_size)
-    pattern = mark_openings(pattern, sample.openings, placed)
-    zips = [
-        row[0].seam for row, each in zip(placed[pattern.sample], sample.openings, strict=True) if each.opens_the_top
-    ]
-    stands = [
-        Stand(
-            piece=piece.name, edge=edge.name, width=opening.buttons.facing_width,
-            grown_on=opening.buttons.facing == "grown-on",
-        )
-        for opening in sample.openings
-        if opening.buttons is not None
-        for piece in pattern.pieces[pattern.sample]
-        for edge in piece.edges
-        if edge.name == f"{opening.line} {STAND}"
-    ]  # fmt: skip
-    girths = {}
-    if any(wish.elastic or wish.kind == "hood" for wish in sample.finishing):
-        for size, garment in garments.items():
-            assert isinstance(garment, FormGarment)
-            girths[size] = {level: each.girth for level, each in garment.mannequin.levels().items()}
-            head = garment.mannequin.extremity("head")
-            girths[size] |= {} if head is None else {"head": head}
-    rises = hem_rises(pattern, sample.finishing)
-    with optional_step("the pattern has no finishing"):
-        pattern = finish_edges(
-            pattern, sample.finishing, gaps=zips, stands=stands, girths=girths, cloth_width=cloth_width
-        )
-    with optional_step("the pattern has no pockets"):
-        pattern = with_flies(add_pockets(pattern, sample.pockets))
-    if not rises:
-        # Godets of one size are equal, unless a slanted hem cuts them.
-        pattern, equal = draw_equal_pieces_once(pattern, called="godet")
-        notes += equal
-    with optional_step(_NO_DRAWING, is_needed=False):
-        pattern = replace(pattern, worn=describe_worn(garments, pattern.sample, rises, pattern.pieces[pattern.sample]))
-    return pattern, notes
-
-
-def _hung_upright(pattern: Pattern, garment: Garment, pairs: Sequence[MirrorPair]) -> Pattern:
-    """Return the pattern with its pieces where they hang about x = 0, the plane at which those that are cut turned over are mirrored.
-
-    A mesh may stand beside that plane, and lean. One that faces sideways is left as it is.
-    """
-    from scipy.spatial.transform import Rotation
-
-    points, images = list[FloatArray](), list[FloatArray]()
-    for pair in pairs:
-        partners = garment.mirror_vertices(pair.of, pair.name)
-        assert partners is not None  # find_mirror_pairs has found them
-        points.append(garment.pieces[pair.of].network.surface.vertices)
-        images.append(garment.pieces[pair.name].network.surface.vertices[partners])
-    normal, off = mirror_plane(np.concatenate(points), np.concatenate(images))
-    if normal[0] < _UPRIGHT:
-        return pattern
-    turn = Rotation.align_vectors([1.0, 0.0, 0.0], normal)[0].as_matrix()
-
-    def hung(piece: Piece) -> Piece:
-        if piece.placement is None:
-            return piece
-        return replace(piece, placement=turn @ piece.placement - np.outer([off, 0.0, 0.0], [0.0, 0.0, 1.0]))
-
-    return replace(pattern, pieces={size: [hung(piece) for piece in row] for size, row in pattern.pieces.items()})
-
-
-def _named_by_pieces(pattern: Pattern) -> Pattern:
-    """Return a pattern of meshes whose seams along lines without a name of the user's are called by the pieces that they join."""
-    seams, taken = list[Seam](), {seam.name for seam in pattern.seams if not _UNNAMED.fullmatch(seam.name)}
-    for seam in pattern.seams:
-        if _UNNAMED.fullmatch(seam.name):
-            seam = replace(seam, name=find_unused_name(joint_words(seam), taken))
-            taken.add(seam.name)
-        seams.append(seam)
-    return replace(pattern, seams=seams)
+    pattern = Pattern(name=name, pieces=pieces, seams=seams, sample_size=sample_size)
+    # Of the pieces of a form no others are equal: godets are.
+    return _Drawn(pattern=pattern, notes=notes, laid=laid, unlike=unlike, placed=placed, alike="godet")
 
 
 def _pieces_of(seam: Seam) -> frozenset[str]:
@@ -351,22 +335,6 @@ def _eased(seam: Seam, pattern: Pattern, stretched: Collection[frozenset[str]]) 
         sum(pattern.piece(side.piece, pattern.sample).edge(side.edge).length for side in row) for row in (first, second)
     )
     return replace(seam, sides=(first, second), ease=other / one - 1.0) if other - one > SEAM_TOLERANCE else seam
-
-
-def _drawn_once(
-    pieces: Mapping[str, Sequence[Piece]], pairs: Sequence[MirrorPair]
-) -> tuple[dict[str, tuple[Piece, ...]], tuple[str, ...]]:
-    """Return the pieces that are drawn, in each size, of each pair one that is cut twice; and a note on each pair."""
-    twice, left_out = {pair.of for pair in pairs}, {pair.name for pair in pairs}
-    drawn = {
-        size: tuple(
-            replace(piece, quantity=2 * piece.quantity) if piece.name in twice else piece
-            for piece in row
-            if piece.name not in left_out
-        )
-        for size, row in pieces.items()
-    }
-    return drawn, tuple(f"{pair.of}: cut twice, once mirrored, it serves for {pair.name} too" for pair in pairs)
 
 
 def _form_piece(

@@ -28,7 +28,7 @@ class Body:
     """
 
     def __init__(self, vertices: FloatArray, faces: IntArray, *, device: wp.Device) -> None:
-        """Build the search tree of a surface (#V by 3 [m], #F by 4), wound counter-clockwise from outside."""
+        """Build the search tree of a surface (#V by 3 [m], #F by 4 or 3), wound counter-clockwise from outside."""
         self.vertices, self.device = vertices, device
         self.triangles, _ = triangulate(faces)
         normals = vertex_normals(vertices, self.triangles)

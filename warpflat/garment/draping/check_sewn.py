@@ -8,6 +8,7 @@ import numpy as np
 import warp as wp
 
 from warpflat.core import BoolArray, FloatArray, IntArray, StepError, launch_each
+from warpflat.flat import mesh_edges
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.limbs import links
 from warpflat.garment.draping.openings import Opening
@@ -30,8 +31,7 @@ def pierced_edges(cloth: SewnCloth, positions: FloatArray) -> tuple[BoolArray, I
         positions: #V by 3 [m].
     """
     body = Body(positions, cloth.faces, device=wp.get_device("cpu"))
-    sides = np.concatenate([body.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
-    edges = np.unique(np.sort(sides, axis=1), axis=0).astype(np.int32)
+    edges = mesh_edges(body.triangles)
     pierced = wp.zeros(len(edges), dtype=wp.int32, device="cpu")
     given = wp.array(edges, dtype=wp.vec2i, device="cpu")
     launch_each(find_pierced, len(edges), [wp.uint64(body.mesh.id), given], [pierced], least=256)

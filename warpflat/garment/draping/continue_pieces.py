@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from warpflat.core import FloatArray, InputError, IntArray
+from warpflat.core import FloatArray, InputError, IntArray, polyline_length
 from warpflat.garment.draping.mesh_pieces import FlatMesh, Weld
 
 __all__ = ["continue_pieces", "hang_from_edges", "hood_beside_head"]
@@ -19,33 +18,19 @@ _HANGS = -0.8
 _NEXT = 4
 
 
-@dataclass(frozen=True)
-class _Join:
-    """Two pieces and the vertices of each that a seam joins."""
-
-    pieces: tuple[str, str]
-    vertices: tuple[IntArray, IntArray]
-
-
-def _joins(welds: Sequence[Sequence[Weld]], names: Sequence[str]) -> list[_Join]:
-    """Return what each seam joins of the named pieces, a piece to itself too."""
+def _joins(welds: Sequence[Sequence[Weld]]) -> list[tuple[tuple[str, str], tuple[IntArray, IntArray]]]:
+    """Return two pieces and the vertices of each for all that a seam joins, either first; a piece with itself too."""
     joins = []
     for seam in welds:
         pairs: dict[tuple[str, str], list[tuple[int, int]]] = {}
         for (piece, vertex), *others in seam:
             for other, its in others:
-                if piece in names and other in names:
-                    pairs.setdefault((piece, other), []).append((vertex, its))
-        for both, rows in pairs.items():
+                pairs.setdefault((piece, other), []).append((vertex, its))
+        for (piece, other), rows in pairs.items():
             if len(rows) > 1:
                 first, second = np.array(rows, dtype=np.int32).T
-                joins.append(_Join(both, (first, second)))
+                joins += [((piece, other), (first, second)), ((other, piece), (second, first))]
     return joins
-
-
-def _both_ways(joins: Sequence[_Join]) -> list[tuple[tuple[str, str], tuple[IntArray, IntArray]]]:
-    """Return pieces and vertices of each join, either first."""
-    return [pair for join in joins for pair in ((join.pieces, join.vertices), (join.pieces[::-1], join.vertices[::-1]))]
 
 
 def continue_pieces(
@@ -71,17 +56,14 @@ def continue_pieces(
     while lost := [name for name in meshes if name not in found]:
         # By piece its vertices that are sewn, the places of these, and where the piece's x and y lead from there.
         sewn: dict[str, list[tuple[IntArray, FloatArray, FloatArray]]] = {name: [] for name in lost}
-        for (name, other), (own, its) in _both_ways(_joins(welds, list(meshes))):
+        for (name, other), (own, its) in _joins(welds):
             if name in lost and other in found:
                 across = _border_frames(meshes[name], own).transpose(0, 2, 1)
                 # Into this piece is out of the other one, or back into it.
                 flat = _border_frames(meshes[other], its) * [1.0, 1.0 if name in turned_down else -1.0] @ across
                 sewn[name].append((own, found[other][its], _slopes(meshes[other], found[other])[its] @ flat))
         lengths = {
-            name: sum(
-                float(np.linalg.norm(np.diff(meshes[name].points[own], axis=0), axis=1).sum()) for own, _, _ in rows
-            )
-            for name, rows in sewn.items()
+            name: sum(polyline_length(meshes[name].points[own]) for own, _, _ in rows) for name, rows in sewn.items()
         }
         name = max(lost, key=lambda each: lengths[each])
         if not sewn[name]:
@@ -114,7 +96,7 @@ def hang_from_edges(
         By piece its points, #P by 3 [m].
     """
     rows: dict[str, list[tuple[IntArray, FloatArray, FloatArray]]] = {name: [] for name in falling}
-    for (name, other), (own, its) in _both_ways(_joins(welds, list(meshes))):
+    for (name, other), (own, its) in _joins(welds):
         if name in falling and other in placed:
             out = -_border_frames(meshes[other], its)[:, :, 1:]
             down = (_slopes(meshes[other], placed[other])[its] @ out)[:, :, 0]
@@ -165,7 +147,7 @@ def hood_beside_head(
         By half its points, #P by 3 [m].
     """
     rows: dict[str, list[tuple[IntArray, FloatArray]]] = {name: [] for name in hood}
-    for (name, other), (own, its) in _both_ways(_joins(welds, list(meshes))):
+    for (name, other), (own, its) in _joins(welds):
         if name in hood and other in placed and other not in hood:
             rows[name].append((own, placed[other][its]))
     found = {}

@@ -19,22 +19,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import coo_array, csc_array, diags_array
 
-from warpflat.core import FloatArray, InputError, IntArray, factor_symmetric, short_repr, weighted_percentiles
-from warpflat.flat import Fabric, Flattening, corner_triangles
+from warpflat.core import (
+    FloatArray,
+    InputError,
+    IntArray,
+    factor_symmetric,
+    polyline_length,
+    short_repr,
+    weighted_percentiles,
+)
+from warpflat.flat import Fabric, Flattening, border_edges, corner_triangles
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.drape_garment import held_vertices
 from warpflat.garment.draping.moved_pattern import (
-    edge_lengths,
+    hold_seams,
     largest_share,
-    pieces_of,
+    seam_differences,
     seam_edges,
-    seam_rows,
     with_pattern,
 )
 from warpflat.garment.draping.relax_drape import relax_drape
 from warpflat.garment.draping.result import Drape
-from warpflat.garment.draping.sewn_cloth import SewnCloth
+from warpflat.garment.draping.sewn_cloth import SewnCloth, pieces_of
 from warpflat.pattern import outline_edges
 
 __all__ = ["Correction", "Round", "correct_pattern", "relieve_pattern"]
@@ -82,14 +89,7 @@ class Correction:
     def moved(self) -> dict[str, FloatArray]:
         """Return how far each vertex of each piece (#P) has moved across the old outline, outwards [m]; 0 inside."""
         old, new = self.before.cloth, self.after.cloth
-        # Each edge of the outline in the direction in which its face, wound counter-clockwise, has it.
-        edges, faces = outline_edges(old.flat_faces), old.flat_faces
-        sides = []
-        for size, part in ((4, faces[faces[:, 3] >= 0]), (3, faces[faces[:, 3] < 0])):
-            sides += [part[:, [side, (side + 1) % size]] for side in range(size)]
-        stride = int(faces.max()) + 1
-        of_edge, of_side = (p[:, 0].astype(np.int64) * stride + p[:, 1] for p in (edges, np.concatenate(sides)))
-        edges = np.where(np.isin(of_edge, of_side)[:, None], edges, edges[:, ::-1])
+        edges = border_edges(old.flat_faces)
         along = old.flat[edges[:, 1]] - old.flat[edges[:, 0]]
         outwards = np.zeros_like(old.flat)
         for end in range(2):
@@ -109,7 +109,7 @@ class Correction:
                 if len(ids) < 2 or not on_outline.issuperset(ids.tolist()):
                     continue
                 across = moved[name][ids]
-                longer = _length(new.flat[ids + begin]) - _length(old.flat[ids + begin])
+                longer = polyline_length(new.flat[ids + begin]) - polyline_length(old.flat[ids + begin])
                 found[f"{name}.{edge}"] = {
                     "mean_m": float(across.mean()), "max_m": float(across[np.abs(across).argmax()]), "longer_m": longer,
                 }  # fmt: skip
@@ -121,10 +121,7 @@ class Correction:
         seams = seam_edges(old)
         if not len(seams):
             return 0.0
-        before, after = (
-            edge_lengths(each.flat, seams[:, 0]) - edge_lengths(each.flat, seams[:, 1]) for each in (old, new)
-        )
-        return float(np.abs(after - before).max())
+        return float(np.abs(seam_differences(new.flat, seams) - seam_differences(old.flat, seams)).max())
 
     def apply(self, garment: Garment | Flattening) -> Garment | Flattening:
         """Return the garment, or the piece, with the corrected pattern."""
@@ -188,7 +185,7 @@ def correct_pattern(
         drape = wear(cloth)
     before = drape
     seams = seam_edges(cloth)
-    difference = edge_lengths(cloth.flat, seams[:, 0]) - edge_lengths(cloth.flat, seams[:, 1])
+    difference = seam_differences(cloth.flat, seams)
     history, reason = [_round(drape, 0.0, bridging)], f"{rounds} rounds"
     for number in range(1, rounds + 1):
         if history[-1].misfit <= wanted:
@@ -247,7 +244,7 @@ def relieve_pattern(drape: Drape, *, hold: Sequence[str] = (), rounds: int = 6) 
         raise InputError("correct: the drape is not at rest; raise max_steps in [drape]")
     held, limit = held_vertices(drape.cloth, hold), drape.cloth.fabric.strain_limit
     seams = seam_edges(drape.cloth)
-    difference = edge_lengths(drape.cloth.flat, seams[:, 0]) - edge_lengths(drape.cloth.flat, seams[:, 1])
+    difference = seam_differences(drape.cloth.flat, seams)
 
     def told(worn: Drape, share: float) -> Round:
         strained = worn.demand.held_by_way[:, :2].any(axis=1)
@@ -259,9 +256,8 @@ def relieve_pattern(drape: Drape, *, hold: Sequence[str] = (), rounds: int = 6) 
         if history[-1].strained == 0.0:
             reason = "no cloth is stretched beyond its limit"
             break
-        corner, _, gradient, _ = drape.cloth.cells()
         # Half the squared length of a thread over that of one at its limit.
-        over = _lengths(drape.positions[corner], gradient)
+        over = _lengths(drape.cloth, drape.positions)
         over -= 0.5 * (1.0 + _EASED * limit) ** 2
         mend, step = _follow(drape.cloth, np.maximum(over, 0.0) * [1.0, 1.0, 0.0], seams, difference)
         share = largest_share(drape.cloth, mend + step)
@@ -290,11 +286,10 @@ def _gauss_newton_step(
         bridging: whether what bridges a hollow is as it should be.
     """
     cloth = drape.cloth
-    corner, _, gradient, _ = cloth.cells()
-    wanted = _lengths(cloth.designed[corner], gradient) - _lengths(drape.positions[corner], gradient)
+    wanted = _lengths(cloth, cloth.designed) - _lengths(cloth, drape.positions)
     if bridging:
         share = drape.misfit / np.maximum(drape.distance, 1e-9)
-        wanted *= share[corner].mean(axis=1)[:, None]
+        wanted *= share[cloth.cells()[0]].mean(axis=1)[:, None]
     return _follow(cloth, wanted, seams, difference)
 
 
@@ -316,15 +311,14 @@ def _follow(
     fabric = cloth.fabric
     threads = 0.5 * (fabric.stiffness_warp + fabric.stiffness_weft)
     shear = max(fabric.shear_stiffness, _LEAST_SHEAR * threads)
-    along = np.stack([-(gradient[:, :2] + gradient[:, 2:]), gradient[:, :2], gradient[:, 2:]], axis=1)
     warp, weft = cloth.warp[face][:, None, :], cloth.weft[face][:, None, :]
-    by_warp, by_weft = along[:, :, :1], along[:, :, 1:]
+    by_warp, by_weft = gradient[:, :, :1], gradient[:, :, 1:]
     # #C by 3 corners by 2 coordinates, for the strain along warp, along weft and in shear.
     rows = [warp * by_warp, weft * by_weft, warp * by_weft + weft * by_warp]
     count, cells = 2 * len(cloth.flat), len(corner)
     columns = (2 * corner_flat[:, :, None] + np.arange(2)).reshape(cells, 6)
-    matrix = csc_array((count, count))
-    right, mending = np.zeros(count), np.zeros(count)
+    matrix, mending = hold_seams(cloth.flat, seams, difference, _SEAM * threads)
+    right = np.zeros(count)
     for values, target, stiffness in zip(
         rows, wanted.T, (fabric.stiffness_warp, fabric.stiffness_weft, shear), strict=True
     ):
@@ -333,25 +327,12 @@ def _follow(
         weighted = diags_array(stiffness * area) @ b
         matrix = matrix + b.T @ weighted
         right += weighted.T @ target
-    if len(seams):
-        b = seam_rows(cloth.flat, seams)
-        now = edge_lengths(cloth.flat, seams[:, 0]) - edge_lengths(cloth.flat, seams[:, 1])
-        weight = _SEAM * threads
-        matrix = matrix + weight * (b.T @ b)
-        mending = weight * (b.T @ (difference - now))
-    matrix = csc_array(matrix + diags_array(np.full(count, _HOLD * threads)))
-    solve = factor_symmetric(matrix)
+    solve = factor_symmetric(csc_array(matrix + diags_array(np.full(count, _HOLD * threads))))
     return solve(mending).reshape(-1, 2), solve(right).reshape(-1, 2)
 
 
-def _lengths(x: FloatArray, gradient: FloatArray) -> FloatArray:
-    """Return half the squared lengths of the threads and the product of both, of cells in space (#C by 3 by 3): #C by 3."""
-    d1, d2 = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
-    warp = d1 * gradient[:, :1] + d2 * gradient[:, 2:3]
-    weft = d1 * gradient[:, 1:2] + d2 * gradient[:, 3:]
+def _lengths(cloth: SewnCloth, positions: FloatArray) -> FloatArray:
+    """Return half the squared lengths of the threads in each cell and the product of both, #C by 3, at #V by 3 places [m]."""
+    warp, weft = cloth.threads(positions)
     products = [0.5 * (warp * warp).sum(axis=1), 0.5 * (weft * weft).sum(axis=1), (warp * weft).sum(axis=1)]
     return np.stack(products, axis=1)
-
-
-def _length(points: FloatArray) -> float:
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

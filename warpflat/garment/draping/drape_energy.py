@@ -95,7 +95,13 @@ class DrapeEnergy:
         self._corner, self.layers = corner, Layers(cloth, device)
         self._list_forces(offset, entry)
         x, at = self.motion.position, {"device": device}
-        self._cells = [x, self._on(corner, wp.vec3i), self._on(gradient, wp.vec4d), self._on(area, wp.float64), law]
+        self._cells = [
+            x,
+            self._on(corner, wp.vec3i),
+            self._on(gradient[:, 1:].reshape(-1, 4), wp.vec4d),
+            self._on(area, wp.float64),
+            law,
+        ]
         self._cell_energy, self._energy = wp.zeros(len(corner) + 2 * count, wp.float64, device), self._zeros(wp.float64)
         self._force = self._zeros(wp.vec3d)
         self.forces_of = [offset, entry, force, bending, moment]

@@ -17,7 +17,7 @@ from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.relax_drape import relax_drape
 from warpflat.garment.draping.result import Drape
-from warpflat.garment.draping.sewn_cloth import SewnCloth, sew_cloth
+from warpflat.garment.draping.sewn_cloth import SewnCloth, pieces_of, sew_cloth
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.pattern import MIRRORED
 
@@ -77,22 +77,16 @@ def drape(
         observer=lambda places: frames.append(places.astype(np.float32)),
     )  # fmt: skip
     worn.check_held()
-    sources = tuple(source for piece in _pieces(garment) for source in piece.surface.sources)
+    sources = tuple(source for piece in pieces_of(garment).values() for source in piece.surface.sources)
     # A cut that `warpflat.advise` has found on one side stands for that on the other side of the body, too.
     cuts = {}
-    for piece in _pieces(garment):
+    for name, piece in pieces_of(garment).items():
         paths = [(remedy.words.partition(",")[0], piece.surface.vertices[remedy.path]) for remedy in piece.remedies]
-        cuts[piece.surface.name] = [(words, np.concatenate([path, path * [-1.0, 1.0, 1.0]])) for words, path in paths]
+        cuts[name] = [(words, np.concatenate([path, path * [-1.0, 1.0, 1.0]])) for words, path in paths]
     return Drape(
         cloth=cloth, worn=worn, body=solid, designed=designed, options=options, sources=sources, frames=tuple(frames),
         hangs_below=hip_level(garment.mannequin if isinstance(garment, FormGarment) else None), cuts=cuts, threaded=gripped,
     )  # fmt: skip
-
-
-def _pieces(garment: Garment | Flattening | Sequence[Flattening]) -> list[Flattening]:
-    if isinstance(garment, Garment):
-        return list(garment.pieces.values())
-    return [garment] if isinstance(garment, Flattening) else list(garment)
 
 
 def held_vertices(cloth: SewnCloth, hold: Sequence[str]) -> BoolArray:

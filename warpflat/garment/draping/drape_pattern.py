@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
 from warpflat.core import FloatArray, InputError, IntArray, nearest, polyline_length, reflected, short_repr, start_warp
-from warpflat.flat import Fabric, Surface, mirror_plane, vertex_normals
+from warpflat.flat import Fabric, Surface, mirror_plane, triangulate, vertex_normals
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.check_sewn import check_sewn
 from warpflat.garment.draping.continue_pieces import continue_pieces, hang_from_edges, hood_beside_head
@@ -20,7 +20,7 @@ from warpflat.garment.draping.drape_garment import held_vertices, hip_level, thr
 from warpflat.garment.draping.lay_around import Laid, lay_around
 from warpflat.garment.draping.lift import Lift, surface_lift, whole_lifts
 from warpflat.garment.draping.limbs import limb_lines, on_arm
-from warpflat.garment.draping.mesh_pieces import FlatMesh, Weld, mesh_pieces, sewn_places, welded_vertices
+from warpflat.garment.draping.mesh_pieces import FlatMesh, Weld, mesh_pieces, sew_meshes
 from warpflat.garment.draping.openings import Opening, find_openings
 from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.relax_drape import relax_drape
@@ -133,7 +133,7 @@ def drape_pattern(
             f"piece {name!r}, the largest, is {1e3 * wide:.1f} by {1e3 * high:.1f} mm; it must be between {1e3 * _SIZES[0]:.0f} "
             f"and {1e3 * _SIZES[1]:.0f} mm long: {_UNITS}"
         )
-    meshes, welds = mesh_pieces(pieces, seams, placement.spacing, closures(pieces))
+    meshes, welds = mesh_pieces(pieces, seams, placement.spacing)
     start_warp()
     where = wp.get_device(device)
     lifts = whole_lifts(pattern.pieces[chosen], placement.lifts)
@@ -159,7 +159,7 @@ def drape_pattern(
             lifted, placed = False, {name: lifts[name](mesh.points) for name, mesh in meshes.items()}
     drafted = [name for name in meshes if name not in placed]
     placed = _continued(placed, pieces, meshes, welds, body)
-    cloth = _cloth(pieces, meshes, welds, placed, fabric, turned)
+    cloth = sew_meshes(pieces, meshes, welds, fabric=fabric, placed=placed, turned=turned)
     designed = Body(cloth.designed, cloth.faces, device=where)
     solid = designed if solid is None else solid
     if not lifted or drafted:
@@ -225,7 +225,7 @@ def place_drafted(
     drafted = [name for name in pieces if name not in whole]
     if not drafted:
         return found
-    meshes, welds = mesh_pieces(pieces, seams, _COARSE, closures(pieces))
+    meshes, welds = mesh_pieces(pieces, seams, _COARSE)
     start_warp()
     hooded = any(piece.role == "hood" for piece in pieces.values())
     solid = _worn_body(body, head=hooded, device=wp.get_device("cpu"))
@@ -242,7 +242,7 @@ def place_drafted(
     }
     placed |= hang_from_edges(placed, meshes, welds, falling)
     placed = _continued(placed, pieces, meshes, welds, body)
-    cloth = _cloth(pieces, meshes, welds, placed, fabric, turned)
+    cloth = sew_meshes(pieces, meshes, welds, fabric=fabric, placed=placed, turned=turned)
     cloth = _sewn_to(cloth, {*meshes} - {*drafted} | {*falling}, _dressed(solid, meshes, placed, whole))
     for name in drafted:
         title = next(each.name for each in given if name == each.name or name.startswith(each.name + " "))
@@ -284,9 +284,7 @@ def _dressed(
         outward = float((vertex_normals(placed[name], triangles) * body.nearest(placed[name])[1]).sum())
         faces.append(count + (triangles if outward > 0.0 else triangles[:, ::-1]))
         vertices.append(placed[name])
-    triangles = np.concatenate(faces)
-    none = np.full((len(triangles), 1), -1)
-    return Body(np.concatenate(vertices), np.hstack([triangles, none]).astype(np.int32), device=body.device)
+    return Body(np.concatenate(vertices), np.concatenate(faces), device=body.device)
 
 
 def _sewn_to(cloth: SewnCloth, stay: Collection[str], body: Body) -> SewnCloth:
@@ -303,9 +301,9 @@ def _worn_body(body: Mannequin, *, head: bool, device: wp.Device) -> Body:
     vertices, faces = draw_out_limbs(surface.vertices, surface.faces)
     above = head_of(body) if head else None
     if above is not None:
-        triangles = np.column_stack([above[1] + len(vertices), np.full(len(above[1]), -1)])
-        vertices, faces = np.concatenate([vertices, above[0]]), np.concatenate([faces, triangles])
-    return Body(vertices, faces.astype(np.int32), device=device)
+        faces = np.concatenate([triangulate(faces)[0], above[1] + len(vertices)])
+        vertices = np.concatenate([vertices, above[0]])
+    return Body(vertices, faces, device=device)
 
 
 def _sew(
@@ -324,11 +322,12 @@ def _sew(
     """
     spacing = max(placement.spacing, _COARSE)
     try:
-        meshes, welds = mesh_pieces(pieces, seams, spacing, closures(pieces))
+        meshes, welds = mesh_pieces(pieces, seams, spacing)
     except InputError:
-        meshes, welds = mesh_pieces(pieces, seams, placement.spacing, closures(pieces))
+        meshes, welds = mesh_pieces(pieces, seams, placement.spacing)
+    cloth = sew_meshes(pieces, meshes, welds, fabric=fabric, turned=turned)
     buttons, lines = closures(pieces), limb_lines(body)
-    openings = find_openings(meshes, welds, welds[-1] if buttons else ())
+    openings = find_openings(cloth, welds[-1] if buttons else ())
     girth, around = (
         polyline_length(body.line("waist"), closed=True),
         max((each.length for each in openings), default=np.inf),
@@ -337,7 +336,7 @@ def _sew(
         raise InputError(
             f"the pattern goes {1e3 * around:.0f} mm around the body, whose waist has {1e3 * girth:.0f} mm: {_UNITS} Is a piece missing?"
         )
-    cloth, laid = lay_pieces(pieces, meshes, welds, openings, body, fabric=fabric, turned=turned, top=placement.top)
+    laid = lay_pieces(cloth, pieces, meshes, openings, body, top=placement.top)
     start, limbs = laid.positions, laid.limbs
     is_hooded = laid.hooded or any(piece.role == "hood" for piece in pieces.values())
     solid = _worn_body(body, head=is_hooded, device=device)
@@ -371,45 +370,6 @@ def _continued(
         halves = hood_beside_head(placed, meshes, welds, hood, float(np.abs(head[0][:, 0]).max()) + _BESIDE_HEAD)
         found = {name: points for name, points in placed.items() if name not in hood} | halves
     return continue_pieces(found, meshes, welds, turned_down(pieces))
-
-
-def _cloth(
-    pieces: Mapping[str, Piece],
-    meshes: Mapping[str, FlatMesh],
-    welds: Sequence[Sequence[Weld]],
-    placed: Mapping[str, FloatArray],
-    fabric: Fabric,
-    turned: frozenset[str],
-) -> SewnCloth:
-    """Join meshes along their seams; vertices that become one start in the middle of their places."""
-    welded, begins = welded_vertices(meshes, welds)
-    flat_faces = np.concatenate(
-        [np.column_stack([m.triangles + begins[n], np.full(len(m.triangles), -1)]) for n, m in meshes.items()]
-    ).astype(np.int32)
-    cells = [len(mesh.triangles) for mesh in meshes.values()]
-    places = np.cumsum([0, *cells]).tolist()
-    grains = [pieces[name].grain for name in meshes]
-    along = [np.array([0.0, 1.0]) if grain is None else grain[1] - grain[0] for grain in grains]
-    warps = np.repeat([line / np.linalg.norm(line) for line in along], cells, axis=0)
-    lines = {
-        f"{name}.{line}": welded[row + begins[name]]
-        for name, m in meshes.items()
-        for line, row in [*m.lines.items(), *m.edges.items()]
-    }
-    return SewnCloth(
-        fabric=fabric,
-        designed=sewn_places(placed, begins, welded),
-        faces=np.where(flat_faces >= 0, welded[flat_faces], -1).astype(np.int32),
-        flat_faces=flat_faces,
-        flat=np.concatenate([mesh.points for mesh in meshes.values()]),
-        welded=welded,
-        warp=warps,
-        weft=np.column_stack([warps[:, 1], -warps[:, 0]]),
-        piece_faces={name: slice(places[k], places[k + 1]) for k, name in enumerate(meshes)},
-        piece_vertices={name: slice(begins[name], begins[name] + len(m.points)) for name, m in meshes.items()},
-        lines=lines,
-        turned=turned,
-    )
 
 
 def _mirrored_in_place(placed: Mapping[str, FloatArray], welds: Sequence[Sequence[Weld]]) -> dict[str, FloatArray]:
@@ -456,17 +416,15 @@ def _elsewhere(placed: Mapping[str, FloatArray], meshes: Mapping[str, FlatMesh],
 
 
 def lay_pieces(
+    cloth: SewnCloth,
     pieces: Mapping[str, Piece],
     meshes: Mapping[str, FlatMesh],
-    welds: Sequence[Sequence[Weld]],
     openings: Sequence[Opening],
     body: Mannequin,
     *,
-    fabric: Fabric,
-    turned: frozenset[str] = frozenset(),
     top: str | float | None = None,
-) -> tuple[SewnCloth, Laid]:
-    """Return the sewn cloth of pieces, and how it is laid around a body: see `lay_around`.
+) -> Laid:
+    """Return how sewn pieces are laid around a body: see `lay_around`.
 
     What lies in front and high is told by the places of a file, else by `at`, names, and how pieces are drawn.
 
@@ -484,9 +442,6 @@ def lay_pieces(
     is_hung = len(hung) == len(meshes)
     everything = np.concatenate([*hung.values(), np.zeros((0, 3))]) if is_hung else np.zeros((1, 3))
     middle = 0.5 * (everything.min(axis=0) + everything.max(axis=0))
-    cloth = _cloth(
-        pieces, meshes, welds, {name: np.zeros((len(m.points), 3)) for name, m in meshes.items()}, fabric, turned
-    )
     up, hints = np.zeros(len(cloth.designed)), np.zeros((len(cloth.designed), 3))
     for name, rows in cloth.piece_vertices.items():
         own, flat = cloth.welded[rows], meshes[name].points
@@ -508,4 +463,4 @@ def lay_pieces(
             return high + float(np.mean(off))
         return high if is_hung and heights["hip"] < high < shoulder else heights["waist"]
 
-    return cloth, lay_around(cloth, openings, body, limb_lines(body), up=up, hints=hints, top=hangs_at)
+    return lay_around(cloth, openings, body, limb_lines(body), up=up, hints=hints, top=hangs_at)

@@ -18,6 +18,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from warpflat.core import BoolArray, FloatArray, InputError, IntArray, factor_symmetric, polyline_length
+from warpflat.flat import border_edges
 from warpflat.garment.draping.openings import Opening
 from warpflat.garment.draping.sew_around import AsRigid
 from warpflat.garment.draping.sewn_cloth import SewnCloth
@@ -109,8 +110,7 @@ def lay_around(
         InputError: the openings are not those of a garment.
     """
     graph, rigid = _edges(cloth), AsRigid(cloth)
-    faces = cloth.faces[:, :3]
-    sides = set(map(tuple, np.concatenate([faces[:, [k, (k + 1) % 3]] for k in range(3)]).tolist()))
+    sides = set(map(tuple, border_edges(cloth.faces).tolist()))
     pairs = [
         pair for each in openings for pair in np.column_stack([each.vertices, np.roll(each.vertices, -1)]).tolist()
     ]

@@ -41,11 +41,7 @@ class Layers:
         """Build the search tree of a cloth; no layer is near before `renew`."""
         self._device, count = device, len(cloth.designed)
         self._triangles, face = triangulate(cloth.faces)
-        corner = self._triangles.ravel()
-        others = np.concatenate(
-            [corner, np.roll(self._triangles, 1, axis=1).ravel(), np.roll(self._triangles, 2, axis=1).ravel()]
-        )
-        near = csr_array(coo_array((np.ones(len(others)), (np.tile(corner, 3), others)), shape=(count, count)))
+        near = cloth.laplacian()[0]
         self._near = [wp.array(each, dtype=wp.int32, device=device) for each in (near.indptr, near.indices)]
         piece = np.zeros(len(cloth.faces))
         for number, rows in enumerate(cloth.piece_faces.values()):
@@ -53,7 +49,7 @@ class Layers:
         self._flat = np.column_stack([cloth.flat[triangulate(cloth.flat_faces)[0]].mean(axis=1), piece[face]])
         self._mesh = wp.Mesh(
             points=wp.array(cloth.designed, dtype=wp.vec3, device=device),
-            indices=wp.array(corner, dtype=wp.int32, device=device),
+            indices=wp.array(self._triangles.ravel(), dtype=wp.int32, device=device),
         )
         self._vertex = np.repeat(np.arange(count), 2)
         self.corner = np.repeat(self._vertex, 3).reshape(-1, 3)

@@ -13,7 +13,7 @@ from warpflat.pattern import MIRRORED, Piece
 
 __all__ = ["Lift", "moved_lift", "read_lift", "surface_lift", "whole_lifts"]
 
-#: The places on a surface (#P by 3 [m]) of points of its pattern (#P by 2 [m]).
+#: The places on a surface (#P by 3 [m]) of points of its pattern (#P by 2 [m]); or what else is linear in its triangles.
 Lift = Callable[[FloatArray], FloatArray]
 
 # Triangles around a point that are tried.
@@ -57,7 +57,7 @@ def surface_lift(space: FloatArray, flat: FloatArray, triangles: IntArray) -> Li
     """Return the map from a pattern to its surface.
 
     Args:
-        space: #V by 3, the surface [m].
+        space: #V by 3, the surface [m]; or #V by any number, what goes with its vertices.
         flat: #V by 2, the pattern [m].
         triangles: #T by 3, of both.
     """

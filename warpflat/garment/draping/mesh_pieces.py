@@ -9,12 +9,13 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
-from warpflat.core import FloatArray, InputError, IntArray, points_at_lengths
-from warpflat.flat import join_labels
-from warpflat.garment.draping.worn_layer import Button
+from warpflat.core import FloatArray, InputError, IntArray, points_at_lengths, polyline_length
+from warpflat.flat import Fabric
+from warpflat.garment.draping.sewn_cloth import ClothPiece, SewnCloth, join_pieces, piece_slices
+from warpflat.garment.draping.worn_layer import closures
 from warpflat.pattern import Edge, Piece, Seam, eased_length, hole_edges
 
-__all__ = ["FlatMesh", "mesh_pieces", "sewn_places", "welded_vertices"]
+__all__ = ["FlatMesh", "Weld", "mesh_pieces", "sew_meshes"]
 
 # Ends of edges on both sides of a seam that are closer than this share of the spacing are sewn to each other.
 _SNAP = 0.35
@@ -45,9 +46,9 @@ Weld = list[tuple[str, int]]
 
 
 def mesh_pieces(
-    pieces: Mapping[str, Piece], seams: Sequence[Seam], spacing: float, buttons: Sequence[Button] = ()
+    pieces: Mapping[str, Piece], seams: Sequence[Seam], spacing: float
 ) -> tuple[dict[str, FlatMesh], list[list[Weld]]]:
-    """Mesh pieces so that the vertices of their seams meet.
+    """Mesh pieces so that the vertices of their seams meet, and those where buttons and ties close them.
 
     Each seam is divided once, at the ends of the edges on both its sides and in between, and both sides get these points.
     The triangles are Delaunay's. A segment of the outline that is not among their edges is divided again, with its seam.
@@ -56,7 +57,6 @@ def mesh_pieces(
         pieces: whole ones.
         seams: between them; each edge in one at most.
         spacing: wished edge [m].
-        buttons: where points inside two pieces are joined; there is a vertex at each.
 
     Returns:
         The meshes by piece, and for each seam the vertices that it joins, from its start to its end; the buttons come last, as one more.
@@ -64,6 +64,7 @@ def mesh_pieces(
     Raises:
         InputError: an edge is in two seams, or a piece is too narrow for the spacing.
     """
+    buttons = closures(pieces)
     loops = {name: [list(piece.edges), *map(hole_edges, piece.holes)] for name, piece in pieces.items()}
     edges = {(name, edge.name): edge for name, rings in loops.items() for ring in rings for edge in ring}
     fixed = {
@@ -105,27 +106,34 @@ def mesh_pieces(
     )
 
 
-def welded_vertices(meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]]) -> tuple[IntArray, dict[str, int]]:
-    """Return #P, the vertex of the sewn mesh of each vertex of the meshes one after the other, and where each begins.
+def sew_meshes(
+    pieces: Mapping[str, Piece],
+    meshes: Mapping[str, FlatMesh],
+    welds: Sequence[Sequence[Weld]],
+    *,
+    fabric: Fabric,
+    placed: Mapping[str, FloatArray] | None = None,
+    turned: frozenset[str] = frozenset(),
+) -> SewnCloth:
+    """Join meshes along their seams.
 
-    Seams of pieces that have no mesh here are left open.
+    Args:
+        pieces: that were meshed.
+        meshes, welds: of them, as of `mesh_pieces`.
+        fabric: of all pieces.
+        placed: by piece where its vertices are designed to lie (#P by 3 [m]); nowhere if not given.
+        turned: the pieces that were turned over.
     """
-    ends = np.cumsum([0, *(len(mesh.points) for mesh in meshes.values())]).tolist()
-    begins = dict(zip(meshes, ends[:-1], strict=True))
-    rows = [[begins[name] + vertex for name, vertex in joint if name in begins] for seam in welds for joint in seam]
-    joints = [(row[0], other) for row in rows for other in row[1:]]
-    first, second = np.array(joints, dtype=np.int64).reshape(-1, 2).T
-    return join_labels(ends[-1], first, second), begins
-
-
-def sewn_places(places: Mapping[str, FloatArray], begins: Mapping[str, int], welded: IntArray) -> FloatArray:
-    """Return #V by 3, the middle of the places (#P by 3 [m] by piece) of all that becomes one vertex of the sewn mesh; NaN without any."""
-    total, count = np.zeros((int(welded.max()) + 1, 3)), np.zeros(int(welded.max()) + 1)
-    for name, points in places.items():
-        rows = welded[begins[name] : begins[name] + len(points)]
-        np.add.at(total, rows, points)
-        np.add.at(count, rows, 1.0)
-    return np.where(count[:, None] > 0.0, total / np.maximum(count, 1.0)[:, None], np.nan)
+    begins = {name: rows.start for name, rows in piece_slices({n: m.points for n, m in meshes.items()}).items()}
+    pairs = [(begins[a] + i, begins[b] + j) for seam in welds for (a, i), *others in seam for b, j in others]
+    cloth = {}
+    for name, mesh in meshes.items():
+        grain = pieces[name].grain
+        along = np.array([0.0, 1.0]) if grain is None else grain[1] - grain[0]
+        space = np.zeros((len(mesh.points), 3)) if placed is None else placed[name]
+        faces = np.pad(mesh.triangles, ((0, 0), (0, 1)), constant_values=-1)
+        cloth[name] = ClothPiece(mesh.points, faces, space, along / np.linalg.norm(along), {**mesh.lines, **mesh.edges})
+    return join_pieces(cloth, *np.array(pairs, dtype=np.int64).reshape(-1, 2).T, fabric=fabric, turned=turned)
 
 
 def _parts(length: float, spacing: float, finer: int) -> int:
@@ -222,8 +230,7 @@ def _mesh(
     if len(inner):
         tree = cKDTree(everything)
         for name, line in piece.internal_lines.items():
-            steps = max(2, int(np.linalg.norm(np.diff(line, axis=0), axis=1).sum() / spacing))
-            length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
-            row = tree.query(points_at_lengths(line, np.linspace(0.0, length, steps)))[1]
+            length = polyline_length(line)
+            row = tree.query(points_at_lengths(line, np.linspace(0.0, length, max(2, int(length / spacing)))))[1]
             lines[name] = np.asarray(list(dict.fromkeys(row.tolist())), dtype=np.int32)
     return FlatMesh(points=everything, triangles=triangles, edges=ids, lines=lines), lost

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,10 +10,19 @@ from scipy.sparse import coo_array, csr_array
 from warpflat.core import FloatArray, IntArray
 from warpflat.flat import Flattening, corner_triangles
 from warpflat.garment.construction.garment import Garment
-from warpflat.garment.draping.sewn_cloth import SewnCloth
+from warpflat.garment.draping.lift import Lift, surface_lift
+from warpflat.garment.draping.sewn_cloth import SewnCloth, pieces_of
 from warpflat.pattern import MIRRORED, Pattern, Piece, outline_edges
 
-__all__ = ["edge_lengths", "largest_share", "moved_outlines", "pieces_of", "seam_edges", "seam_rows", "with_pattern"]
+__all__ = [
+    "edge_lengths",
+    "hold_seams",
+    "largest_share",
+    "moved_outlines",
+    "seam_differences",
+    "seam_edges",
+    "with_pattern",
+]
 
 # No cell shrinks below this share of its area in a step.
 _LEAST_AREA = 0.5
@@ -37,8 +45,23 @@ def edge_lengths(flat: FloatArray, edges: IntArray) -> FloatArray:
     return np.asarray(np.linalg.norm(flat[edges[:, 1]] - flat[edges[:, 0]], axis=1))
 
 
-def seam_rows(flat: FloatArray, seams: IntArray) -> csr_array:
-    """Return the change of the difference in length of the two sides by the displacement of the vertices, #S by 2 #P."""
+def seam_differences(flat: FloatArray, seams: IntArray) -> FloatArray:
+    """Return #S, the difference in length of the two sides of seams [m]."""
+    return edge_lengths(flat, seams[:, 0]) - edge_lengths(flat, seams[:, 1])
+
+
+def hold_seams(
+    flat: FloatArray, seams: IntArray, difference: FloatArray, weight: float
+) -> tuple[csr_array, FloatArray]:
+    """Return a stiffness of the flat vertices (2 #P by 2 #P) and the forces (2 #P) that give the sides of seams their wanted difference.
+
+    Args:
+        flat: #P by 2 [m].
+        seams: see `seam_edges`.
+        difference: #S [m].
+        weight: of the square of each difference.
+    """
+    # The change of the difference by the displacement of the vertices, #S by 2 #P.
     rows, columns, values = [], [], []
     for side, sign in ((0, 1.0), (1, -1.0)):
         ends = seams[:, side]
@@ -48,8 +71,9 @@ def seam_rows(flat: FloatArray, seams: IntArray) -> csr_array:
             rows.append(np.repeat(np.arange(len(seams)), 2))
             columns.append((2 * ends[:, end, None] + np.arange(2)).ravel())
             values.append(of_end.ravel())
-    shape = (len(seams), 2 * len(flat))
-    return coo_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape).tocsr()
+    places, shape = (np.concatenate(rows), np.concatenate(columns)), (len(seams), 2 * len(flat))
+    change = coo_array((np.concatenate(values), places), shape=shape).tocsr()
+    return weight * (change.T @ change), weight * (change.T @ (difference - seam_differences(flat, seams)))
 
 
 def largest_share(cloth: SewnCloth, step: FloatArray) -> float:
@@ -76,19 +100,12 @@ def moved_outlines(pattern: Pattern, size: str, before: SewnCloth, after: SewnCl
         size: that was meshed.
         before, after: the cloth, whose pieces are those of :func:`warpflat.pattern.drafting.whole_pieces.whole_pieces`.
     """
-    from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
-    def mover(name: str) -> Callable[[FloatArray], FloatArray]:
+    def mover(name: str) -> Lift:
         rows = before.piece_vertices[name]
         across = [-1.0, 1.0] if name in before.turned else [1.0, 1.0]
-        places, move = before.flat[rows] * across, (after.flat[rows] - before.flat[rows]) * across
-        inside, beside = LinearNDInterpolator(places, move), NearestNDInterpolator(places, move)
-
-        def moves(points: FloatArray) -> FloatArray:
-            found = inside(points)
-            return np.where(np.isfinite(found), found, beside(points))
-
-        return moves
+        triangles = before.flat_faces[before.piece_faces[name], :3] - rows.start
+        return surface_lift((after.flat[rows] - before.flat[rows]) * across, before.flat[rows] * across, triangles)
 
     def moved(piece: Piece) -> Piece:
         if piece.name not in before.piece_vertices:
@@ -113,11 +130,6 @@ def moved_outlines(pattern: Pattern, size: str, before: SewnCloth, after: SewnCl
         )  # fmt: skip
 
     return replace(pattern, pieces={size: [moved(piece) for piece in pattern.pieces[size]]}, sample_size=size)
-
-
-def pieces_of(garment: Garment | Flattening) -> dict[str, Flattening]:
-    """Return the pieces by their names."""
-    return dict(garment.pieces) if isinstance(garment, Garment) else {garment.surface.name: garment}
 
 
 def with_pattern(garment: Garment | Flattening, cloth: SewnCloth) -> Garment | Flattening:

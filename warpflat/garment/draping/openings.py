@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from warpflat.core import InputError, IntArray
 from warpflat.flat import border_loops, orient
-from warpflat.garment.draping.mesh_pieces import FlatMesh, Weld, welded_vertices
+from warpflat.garment.draping.mesh_pieces import Weld
+from warpflat.garment.draping.sewn_cloth import SewnCloth
 
 __all__ = ["Opening", "find_openings"]
 
@@ -31,40 +32,31 @@ class Opening:
     turn: float
 
 
-def find_openings(
-    meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]], buttons: Sequence[Weld] = ()
-) -> list[Opening]:
+def find_openings(cloth: SewnCloth, buttons: Sequence[Weld] = ()) -> list[Opening]:
     """Return the openings of pieces that are sewn together, the longest first; none where their seams make no surface.
 
     A border that runs along both fronts of a buttoned garment is two: one beyond the first button, one beyond the last.
 
     Args:
-        meshes: the pieces.
-        welds: for each seam the vertices that it joins.
-        buttons: those of them that join points inside two pieces.
+        cloth: of triangles.
+        buttons: what joins points inside two pieces.
     """
-    welded, begins = welded_vertices(meshes, welds)
-    faces = np.concatenate([welded[mesh.triangles + begins[name]] for name, mesh in meshes.items()])
     try:
-        loops = border_loops(orient(np.column_stack([faces, np.full(len(faces), -1, np.int32)]))[0])
+        loops = border_loops(orient(cloth.faces)[0])
     except InputError:
         return []
+    names = [name for name, rows in cloth.piece_faces.items() for _ in range(rows.start, rows.stop)]
     lengths: dict[tuple[int, int], tuple[float, str]] = {}
-    angle = np.zeros(len(welded))
-    for name, mesh in meshes.items():
-        for k in range(3):
-            corner, *others = (mesh.points[mesh.triangles[:, (k + step) % 3]] @ [1.0, 1j] for step in range(3))
-            np.add.at(
-                angle,
-                welded[mesh.triangles[:, k] + begins[name]],
-                np.angle((others[1] - corner) / (others[0] - corner)),
-            )
-        edges = np.concatenate([mesh.triangles[:, [0, 1]], mesh.triangles[:, [1, 2]], mesh.triangles[:, [2, 0]]])
-        along = np.linalg.norm(mesh.points[edges[:, 0]] - mesh.points[edges[:, 1]], axis=1).tolist()
-        pairs = np.sort(welded[edges + begins[name]], axis=1).tolist()
-        lengths |= {(a, b): (length, name) for (a, b), length in zip(pairs, along, strict=True)}
+    angle = np.zeros(len(cloth.designed))
+    for k in range(3):
+        vertex, ahead, behind = (cloth.flat_faces[:, (k + step) % 3] for step in range(3))
+        corner, *others = (cloth.flat[each] @ [1.0, 1j] for each in (vertex, ahead, behind))
+        np.add.at(angle, cloth.welded[vertex], np.angle((others[1] - corner) / (others[0] - corner)))
+        pairs = np.sort(cloth.welded[np.column_stack([vertex, ahead])], axis=1).tolist()
+        along = np.abs(others[0] - corner).tolist()
+        lengths |= {(a, b): (length, name) for (a, b), length, name in zip(pairs, along, names, strict=True)}
     found = []
-    for loop in [part for whole in loops for part in _between_buttons(whole, meshes, welded, begins, buttons)]:
+    for loop in [part for whole in loops for part in _between_buttons(whole, cloth, buttons)]:
         sides = np.sort(np.column_stack([loop, np.roll(loop, -1)]), axis=1).tolist()
         on = [lengths[a, b] for a, b in sides if (a, b) in lengths]
         pieces = frozenset(name for _, name in on)
@@ -74,20 +66,14 @@ def find_openings(
     return sorted(found, key=lambda each: (-round(each.length, 6), int(each.vertices.min())))
 
 
-def _between_buttons(
-    loop: IntArray,
-    meshes: Mapping[str, FlatMesh],
-    welded: IntArray,
-    begins: Mapping[str, int],
-    buttons: Sequence[Weld],
-) -> list[IntArray]:
+def _between_buttons(loop: IntArray, cloth: SewnCloth, buttons: Sequence[Weld]) -> list[IntArray]:
     """Return the parts of a border that lie beyond the first and the last of the buttons that join it to itself."""
     parts, ends = [loop], list[tuple[int, ...]]()
     for layers in buttons:
         nearest = []
         for name, vertex in layers:
-            own = welded[begins[name] : begins[name] + len(meshes[name].points)]
-            far = np.linalg.norm(meshes[name].points - meshes[name].points[vertex], axis=1)
+            own, flat = (rows[cloth.piece_vertices[name]] for rows in (cloth.welded, cloth.flat))
+            far = np.linalg.norm(flat - flat[vertex], axis=1)
             nearest.append(int(own[np.where(np.isin(own, loop), far, np.inf).argmin()]))
         for k, part in enumerate(parts):
             if len({name for name, _ in layers}) == 2 and nearest[0] != nearest[1] and np.isin(nearest, part).all():

@@ -77,7 +77,21 @@ def find_places(
         strains: #F, along "warp" and "weft", and "shear" [degrees].
         gathered: #V, true where an elastic draws the cloth together.
     """
-    found = []
+    found = list[Place]()
+
+    def tell(part: IntArray, worst: int, kind: str, amount: float, words: str, *, gapes: bool = False) -> None:
+        area = float(areas[part].sum())
+        if area < _LEAST_AREA:
+            return
+        line = _line_at(cloth, worst)
+        piece, _, near = line.partition(".")
+        called = f"{piece.replace('_', ' ')} near {near}" if near else "the cloth"
+        place = Place(
+            kind=kind, line=line, worst=amount, gap=float(gap[worst]), area=area,
+            words=f"{called} {words} over {1e4 * area:.0f} cm2", vertex=worst, gapes=gapes,
+        )  # fmt: skip
+        found.append(place)
+
     # Cloth gapes at an edge of the garment. Inside, as in a flute of a skirt, it stands off.
     edge = np.zeros(len(gap), dtype=bool)
     edge[border_edges(cloth.faces)] = True
@@ -88,34 +102,20 @@ def find_places(
     }
     for kind, values in parts.items():
         for part in _parts(cloth, values > _WORTH):
-            if areas[part].sum() >= _LEAST_AREA:
-                worst = int(part[values[part].argmax()])
-                line, area, distance = _line_at(cloth, worst), float(areas[part].sum()), float(values[worst])
-                size = f"over {1e4 * area:.0f} cm2"
-                stands_off = lift[worst] > 0.5 * distance
-                gapes = bool(stands_off and kind == "misfit" and edge[part].any())
-                if kind == "bridged":
-                    words = f"{_called(line)} bridges a hollow, {1e3 * distance:.1f} mm off, {size}"
-                elif gapes:
-                    words = f"{_called(line)} gapes by {1e3 * gap[worst]:.1f} mm {size}"
-                elif stands_off:
-                    words = f"{_called(line)} stands off {1e3 * distance:.1f} mm farther than designed, {size}"
-                elif lift[worst] < -0.5 * distance:
-                    words = f"{_called(line)} falls in by {1e3 * distance:.1f} mm {size}"
-                else:
-                    words = f"{_called(line)} has moved by {1e3 * distance:.1f} mm {size}"
-                found.append(
-                    Place(
-                        kind=kind,
-                        line=line,
-                        worst=distance,
-                        gap=float(gap[worst]),
-                        area=area,
-                        words=words,
-                        vertex=worst,
-                        gapes=gapes,
-                    )
-                )
+            worst = int(part[values[part].argmax()])
+            distance, stands_off = float(values[worst]), lift[worst] > 0.5 * float(values[worst])
+            gapes = bool(stands_off and kind == "misfit" and edge[part].any())
+            if kind == "bridged":
+                words = f"bridges a hollow, {1e3 * distance:.1f} mm off,"
+            elif gapes:
+                words = f"gapes by {1e3 * gap[worst]:.1f} mm"
+            elif stands_off:
+                words = f"stands off {1e3 * distance:.1f} mm farther than designed,"
+            elif lift[worst] < -0.5 * distance:
+                words = f"falls in by {1e3 * distance:.1f} mm"
+            else:
+                words = f"has moved by {1e3 * distance:.1f} mm"
+            tell(part, worst, kind, distance, words, gapes=gapes)
     # The mean of the faces at each vertex.
     used = cloth.faces >= 0
     vertex = cloth.faces[used]
@@ -127,26 +127,14 @@ def find_places(
     demand = Demand.of(cloth.fabric, *at_vertices)
     for column, beyond in enumerate(demand.beyond_by_way.T):
         for part in _parts(cloth, beyond):
-            if areas[part].sum() >= _LEAST_AREA:
-                worst = int(part[np.abs(demand.shares[part, column]).argmax()])
-                line, area, amount = _line_at(cloth, worst), float(areas[part].sum()), demand.amount(worst, column)
-                kind = "shear" if amount.way == "shear" else "strain"
-                how = "pressed together" if amount.state == "slack" else amount.state
-                limit = f", beyond the cloth's limit of {amount.limit_words}"
-                if amount.state != "stretched" and gathered[part].any():
-                    kind, how, limit = "hang", "gathered by its elastic", ""
-                words = f"{_called(line)} is {how} by {amount.words}{limit}, over {1e4 * area:.0f} cm2"
-                found.append(
-                    Place(
-                        kind=kind,
-                        line=line,
-                        worst=amount.value,
-                        gap=float(gap[worst]),
-                        area=area,
-                        words=words,
-                        vertex=worst,
-                    )
-                )
+            worst = int(part[np.abs(demand.shares[part, column]).argmax()])
+            amount = demand.amount(worst, column)
+            kind = "shear" if amount.way == "shear" else "strain"
+            how = "pressed together" if amount.state == "slack" else amount.state
+            limit = f", beyond the cloth's limit of {amount.limit_words}"
+            if amount.state != "stretched" and gathered[part].any():
+                kind, how, limit = "hang", "gathered by its elastic", ""
+            tell(part, worst, kind, amount.value, f"is {how} by {amount.words}{limit},")
     order = {"misfit": 0, "strain": 1, "shear": 2, "hang": 3, "bridged": 4}
     found.sort(key=lambda place: (order[place.kind], -abs(place.worst) * place.area))
     return tuple(found[:_MOST])
@@ -173,8 +161,3 @@ def _line_at(cloth: SewnCloth, vertex: int) -> str:
         name: float(np.linalg.norm(cloth.designed[ids] - place, axis=1).min()) for name, ids in cloth.lines.items()
     }
     return min(distances, key=distances.__getitem__) if distances else ""
-
-
-def _called(line: str) -> str:
-    piece, _, name = line.partition(".")
-    return f"{piece.replace('_', ' ')} near {name}" if name else "the cloth"

@@ -25,7 +25,14 @@ from warpflat.flat import Flattening, corner_triangles
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.draping.drape_energy import DrapeEnergy
 from warpflat.garment.draping.drape_garment import held_vertices
-from warpflat.garment.draping.moved_pattern import edge_lengths, largest_share, seam_edges, seam_rows, with_pattern
+from warpflat.garment.draping.moved_pattern import (
+    edge_lengths,
+    hold_seams,
+    largest_share,
+    seam_differences,
+    seam_edges,
+    with_pattern,
+)
 from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.sewn_cloth import SewnCloth, sew_cloth
 
@@ -93,37 +100,32 @@ def recover_cloth(
     if not held.any():
         raise InputError("recover_pattern: nothing holds the cloth; name at least one line in hold")
     options, seams = options or DrapeOptions(), seam_edges(cloth)
-    difference = edge_lengths(cloth.flat, seams[:, 0]) - edge_lengths(cloth.flat, seams[:, 1])
+    difference = seam_differences(cloth.flat, seams)
     strains, off, converged = list[float](), np.zeros(len(held)), False
     while len(strains) < steps and not converged:
         # Newton's method for the places of the cloth at rest and the displacement of its flat vertices.
         energy = DrapeEnergy(cloth, None, options, held)
         x, threads = cloth.designed, 0.5 * (cloth.fabric.stiffness_warp + cloth.fabric.stiffness_weft)
         force = -energy.at(x).gradient
-        corner, corner_flat = cloth.cells()[0], corner_triangles(cloth.flat_faces)[0]
+        corner_flat, face, _ = corner_triangles(cloth.flat_faces)
         # The deformation gradient F of the designed shape, in the coordinates of the plane, #C by 3 by 2.
-        in_space, in_flat = (
-            np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=-1)
-            for p in (x[cloth.welded[corner_flat]], cloth.flat[corner_flat])
-        )
-        deformation = in_space @ np.linalg.inv(in_flat)
+        axes = np.stack([cloth.warp[face], cloth.weft[face]])
+        deformation = np.einsum("wca,wcl->cal", cloth.threads(x), axes)
         # A hanging weft has no tension, and rounding must not decide what is slack: the stiffness is that of a shape a little larger.
         taut = (1.0 + _TAUT) * x
         # J in cells: K F; and F K F, the cloth's stiffness in its plane.
         by_flat = np.einsum("cijab,cbk->ciajk", energy.cell_stiffness(taut), deformation)
         in_plane = np.einsum("cal,ciajk->ciljk", deformation, by_flat)
         space, flat = 3 * len(x), 2 * len(cloth.flat)
-        rows, columns = (3 * corner[:, :, None] + np.arange(3)), (2 * corner_flat[:, :, None] + np.arange(2))
+        rows, columns = (
+            (3 * cloth.welded[corner_flat][..., None] + np.arange(3)),
+            (2 * corner_flat[..., None] + np.arange(2)),
+        )
         free = diags_array(np.repeat((~held).astype(np.float64), 3))
         jacobian = free @ _assembled(by_flat, rows, columns, (space, flat))
         damping = _DAMPING * _assembled(in_plane, columns, columns, (flat, flat))
-        damping = damping + diags_array(np.full(flat, _HOLD * threads))
-        right = np.zeros(flat)
-        if len(seams):
-            sides = seam_rows(cloth.flat, seams)
-            now = edge_lengths(cloth.flat, seams[:, 0]) - edge_lengths(cloth.flat, seams[:, 1])
-            damping = damping + _SEAM * threads * (sides.T @ sides)
-            right = _SEAM * threads * (sides.T @ (difference - now))
+        sides, right = hold_seams(cloth.flat, seams, difference, _SEAM * threads)
+        damping = damping + sides + diags_array(np.full(flat, _HOLD * threads))
         matrix = csc_array(block_array([[energy.stiffness(taut), -jacobian], [-jacobian.T, -damping]]))
         found = factor_symmetric(matrix)(np.concatenate([force.ravel(), -right]))
         off, u = np.linalg.norm(found[:space].reshape(-1, 3), axis=1), found[space:].reshape(-1, 2)

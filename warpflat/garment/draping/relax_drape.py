@@ -135,8 +135,7 @@ class _DynamicRelaxation:
 def _gershgorin_bounds(cloth: SewnCloth) -> FloatArray:
     """Return #V, bounds of the sums of the stiffness around each vertex [N/m], by Gershgorin's discs."""
     fabric, (corner, _, gradient, area), (laplacian, stiffness) = cloth.fabric, cloth.cells(), cloth.laplacian()
-    along = np.stack([-(gradient[:, :2] + gradient[:, 2:]), gradient[:, :2], gradient[:, 2:]], axis=1)
-    size = np.abs(along)
+    size = np.abs(gradient)
     total = size.sum(axis=1, keepdims=True)
     steepest = []
     for direction in ("warp", "weft"):

@@ -151,11 +151,8 @@ class Drape:
     @cached_property
     def strains(self) -> dict[str, FloatArray]:
         """Strain of each face along warp and weft, and shear, the angle by which they are off the right angle [degrees], #F each."""
-        corner, face, gradient, area = self.cloth.cells()
-        x = self.positions[corner]
-        d1, d2 = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
-        warp = d1 * gradient[:, :1] + d2 * gradient[:, 2:3]
-        weft = d1 * gradient[:, 1:2] + d2 * gradient[:, 3:]
+        _, face, _, area = self.cloth.cells()
+        warp, weft = self.cloth.threads(self.positions)
         along = [np.linalg.norm(threads, axis=1) - 1.0 for threads in (warp, weft)]
         shear = shear_angles(np.column_stack([*along, (warp * weft).sum(axis=1)]))
         strains = {"warp": along[0], "weft": along[1], "shear": shear}

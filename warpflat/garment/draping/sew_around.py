@@ -80,12 +80,17 @@ class AsRigid:
     """
 
     def __init__(self, cloth: SewnCloth) -> None:
-        self._derivative, self._stiffness = _derivative(cloth)
-        self.membrane = (self._derivative.T @ diags_array(self._stiffness) @ self._derivative).tocsr()
+        # The derivative of the places along warp and weft in each cell, 2 #C by #V, and the cells' areas, twice each.
+        corner, _, gradient, area = cloth.cells()
+        rows = np.broadcast_to(np.arange(2 * len(corner)).reshape(-1, 1, 2), gradient.shape)
+        places, shape = (rows.ravel(), np.repeat(corner.ravel(), 2)), (2 * len(corner), len(cloth.designed))
+        self._derivative = coo_array((gradient.ravel(), places), shape=shape).tocsr()
+        self._stiffness = np.repeat(area, 2)
         # Bending is the squared Laplacian at inner vertices, scaled by the mesh so that it weighs as the membrane does.
         laplacian, of_vertex = cloth.laplacian()
-        area = cloth.vertex_areas()
-        inner = np.where(of_vertex > 0.0, area.mean() / np.maximum(area, 0.2 * area.mean()), 0.0)
+        self.membrane = -laplacian
+        own = cloth.vertex_areas()
+        inner = np.where(of_vertex > 0.0, own.mean() / np.maximum(own, 0.2 * own.mean()), 0.0)
         self._whole = self.membrane + _BEND * (laplacian.T @ diags_array(inner) @ laplacian)
 
     def hold(self, weight: FloatArray) -> None:
@@ -102,20 +107,7 @@ class AsRigid:
 
 def stretches(cloth: SewnCloth, positions: FloatArray) -> FloatArray:
     """Return #C, how much the more stretched thread of each cell is longer than in the flat pattern, as a share."""
-    frames = (_derivative(cloth)[0] @ positions).reshape(-1, 2, 3)
-    return np.asarray(np.linalg.norm(frames, axis=2).max(axis=1) - 1.0)
-
-
-def _derivative(cloth: SewnCloth) -> tuple[coo_array, FloatArray]:
-    """Return the derivative of the places along warp and weft in each cell (2 #C by #V), and the cells' areas, twice each (2 #C)."""
-    corner, _, gradient, area = cloth.cells()
-    along = gradient.reshape(-1, 2, 2)
-    weights = np.concatenate([-along.sum(axis=1, keepdims=True), along], axis=1)  # cell, corner, direction
-    rows = np.arange(2 * len(corner)).reshape(-1, 1, 2)
-    places = (np.broadcast_to(rows, weights.shape).ravel(), np.repeat(corner.ravel(), 2))
-    return coo_array((weights.ravel(), places), shape=(2 * len(corner), len(cloth.designed))).tocsr(), np.repeat(
-        area, 2
-    )
+    return np.asarray(np.linalg.norm(cloth.threads(positions), axis=2).max(axis=0) - 1.0)
 
 
 def _nearest_isometries(frames: FloatArray) -> FloatArray:

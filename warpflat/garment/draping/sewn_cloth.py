@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Sized
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from warpflat.core import FloatArray, InputError, IntArray
+from warpflat.core import FloatArray, InputError, IntArray, range_offsets
 from warpflat.flat import Fabric, Flattening, corner_triangles, grain_axes, join_labels
 from warpflat.garment.construction.darts import dart_pairs
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.garment import Garment
 from warpflat.pattern import outline_edges
 
-__all__ = ["SewnCloth", "sew_cloth"]
+__all__ = ["ClothPiece", "SewnCloth", "join_pieces", "piece_slices", "pieces_of", "sew_cloth"]
 
 Seam = tuple[tuple[str, str], tuple[IntArray, IntArray]]
 
@@ -55,16 +56,21 @@ class SewnCloth:
         """Return the membrane's cells: a triangle, or the four corner triangles of a quad with half their area each.
 
         Returns:
-            #C by 3 vertices of the sewn mesh; #C, the face of each; #C by 4, gradients of the weight of corner 1 along
-            warp and weft, then of corner 2 [1/m]; #C, the flat area [m2].
+            #C by 3 vertices of the sewn mesh; #C, the face of each; #C by 3 by 2, gradients of the weight of each corner
+            along warp and weft [1/m]; #C, the flat area [m2].
         """
         corner, face, share = corner_triangles(self.flat_faces)
         p = self.flat[corner]
         edges = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=-1)
         inverse = np.linalg.inv(edges)
-        along = [np.einsum("ckj,cj->ck", inverse, axis[face]) for axis in (self.warp, self.weft)]
-        gradient = np.stack([along[0][:, 0], along[1][:, 0], along[0][:, 1], along[1][:, 1]], axis=1)
+        along = inverse @ np.stack([self.warp[face], self.weft[face]], axis=-1)
+        gradient = np.concatenate([-along.sum(axis=1, keepdims=True), along], axis=1)
         return self.welded[corner], face, gradient, 0.5 * share * np.linalg.det(edges)
+
+    def threads(self, positions: FloatArray) -> FloatArray:
+        """Return warp and weft in each cell of cloth at #V by 3 places [m], 2 by #C by 3: of length 1 without strain."""
+        corner, _, gradient, _ = self.cells()
+        return np.einsum("cki,ckw->wci", positions[corner], gradient)
 
     def laplacian(self) -> tuple[csr_array, FloatArray]:
         """Return the flat cloth's Laplacian, across seams too, and the bending stiffness at each vertex.
@@ -73,25 +79,16 @@ class SewnCloth:
         rows have no stiffness, and the vertices next to it stand for its area.
 
         Returns:
-            #V by #V, L with cotangents as weights; #V, s = B a / A^2 [N/m], A the area of a vertex and a that which it
-            stands for: the energy is 1/2 s |L x|^2.
+            #V by #V, L with cotangents as weights and an entry for any two vertices of a cell; #V, s = B a / A^2 [N/m], A the
+            area of a vertex and a that which it stands for: the energy is 1/2 s |L x|^2.
         """
-        corner, _, share = corner_triangles(self.flat_faces)
-        p, count = self.flat[corner], len(self.designed)
-        rows, columns, values = [], [], []
-        for k in range(3):
-            a, b = p[:, (k + 1) % 3] - p[:, k], p[:, (k + 2) % 3] - p[:, k]
-            cotangent = np.einsum("ij,ij->i", a, b) / np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-            i, j, w = self.welded[corner[:, (k + 1) % 3]], self.welded[corner[:, (k + 2) % 3]], 0.5 * share * cotangent
-            rows += [i, j, i, j]
-            columns += [j, i, i, j]
-            values += [w, w, -w, -w]
-        places = (np.concatenate(rows), np.concatenate(columns))
-        matrix = csr_array(coo_array((np.concatenate(values), places), shape=(count, count)))
+        corner, _, gradient, of_cell = self.cells()
+        count, places = len(self.designed), (np.repeat(corner, 3, axis=1).ravel(), np.tile(corner, (1, 3)).ravel())
+        values = -of_cell[:, None, None] * (gradient @ gradient.transpose(0, 2, 1))
+        matrix = csr_array(coo_array((values.ravel(), places), shape=(count, count)))
         area, inside = self.vertex_areas(), np.ones(count)
         inside[outline_edges(self.faces).ravel()] = 0.0
-        near = csr_array(coo_array((np.ones(len(places[0])), places), shape=(count, count)))
-        near.data[:] = 1.0
+        near = csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
         takers = near @ inside
         stands_for = area + near @ (np.where(inside == 0.0, area, 0.0) / np.maximum(takers, 1.0))
         return matrix, np.asarray(self.fabric.bending * inside * stands_for / area**2)
@@ -101,6 +98,73 @@ class SewnCloth:
         corner, _, _, area = self.cells()
         summed = np.bincount(corner.ravel(), np.repeat(area / 3.0, 3), minlength=len(self.designed))
         return summed.astype(np.float64)
+
+
+class ClothPiece(NamedTuple):
+    """A piece of cloth: #P by 2, flat [m]; #F by 4 faces; #P by 3, in space [m]; 2, its warp; lines by name, as vertices."""
+
+    flat: FloatArray
+    faces: IntArray
+    space: FloatArray
+    warp: FloatArray
+    lines: Mapping[str, IntArray]
+
+
+def piece_slices(rows: Mapping[str, Sized]) -> dict[str, slice]:
+    """Return where the rows of each piece lie when they stand one piece after the other."""
+    ends = range_offsets([len(each) for each in rows.values()]).tolist()
+    return dict(zip(rows, map(slice, ends[:-1], ends[1:]), strict=True))
+
+
+def join_pieces(
+    pieces: Mapping[str, ClothPiece],
+    one: IntArray,
+    other: IntArray,
+    *,
+    fabric: Fabric,
+    turned: frozenset[str] = frozenset(),
+) -> SewnCloth:
+    """Sew pieces together: vertices that become one are designed to lie in the middle of their places.
+
+    Args:
+        pieces: by name.
+        one, other: the vertices that are sewn to each other, where those of the pieces stand one piece after the other.
+        fabric: the cloth.
+        turned: the pieces that lie turned over.
+    """
+    vertices = piece_slices({name: piece.flat for name, piece in pieces.items()})
+    faces = {name: piece.faces for name, piece in pieces.items()}
+    flat_faces = np.concatenate([np.where(rows >= 0, rows + vertices[name].start, -1) for name, rows in faces.items()])
+    flat = np.concatenate([piece.flat for piece in pieces.values()])
+    space = np.concatenate([piece.space for piece in pieces.values()])
+    welded = join_labels(len(flat), one, other)
+    total = np.stack([np.bincount(welded, column) for column in space.T], axis=1)
+    warp = np.repeat([piece.warp for piece in pieces.values()], [len(each) for each in faces.values()], axis=0)
+    return SewnCloth(
+        fabric=fabric,
+        designed=total / np.bincount(welded)[:, None],
+        faces=np.where(flat_faces >= 0, welded[flat_faces], -1).astype(np.int32),
+        flat_faces=flat_faces.astype(np.int32),
+        flat=flat,
+        welded=welded,
+        warp=warp,
+        weft=np.column_stack([warp[:, 1], -warp[:, 0]]),
+        piece_faces=piece_slices(faces),
+        piece_vertices=vertices,
+        lines={
+            f"{name}.{line}": welded[ids + vertices[name].start]
+            for name, piece in pieces.items()
+            for line, ids in piece.lines.items()
+        },
+        turned=turned,
+    )
+
+
+def pieces_of(garment: Garment | Flattening | Sequence[Flattening]) -> dict[str, Flattening]:
+    """Return flat pieces by their names."""
+    if isinstance(garment, Garment):
+        return dict(garment.pieces)
+    return {piece.surface.name: piece for piece in ([garment] if isinstance(garment, Flattening) else garment)}
 
 
 def sew_cloth(garment: Garment | Flattening | Sequence[Flattening], *, seams: Sequence[Seam] = ()) -> SewnCloth:
@@ -113,19 +177,15 @@ def sew_cloth(garment: Garment | Flattening | Sequence[Flattening], *, seams: Se
     Raises:
         InputError: the pieces are of different cloths, a face is mirrored, or the garment consists of half pieces.
     """
-    if isinstance(garment, Garment):
-        pieces = dict(garment.pieces)
-        if isinstance(garment, FormGarment):
-            folded = [name for name, piece in garment.form.pieces.items() if piece.fold]
-            if folded:
-                raise InputError(
-                    f"drape: piece {folded[0]} is half a piece on the fold; flatten the whole garment: half = false"
-                )
-            runs = [(seam.pieces, run.vertices) for seam in garment.form.seams for run in seam.runs]
-            seams = [*runs, *((pair.pieces, pair.vertices) for pair in dart_pairs(garment.form)), *seams]
-    else:
-        given = [garment] if isinstance(garment, Flattening) else list(garment)
-        pieces = {piece.surface.name: piece for piece in given}
+    pieces = pieces_of(garment)
+    if isinstance(garment, FormGarment):
+        folded = [name for name, piece in garment.form.pieces.items() if piece.fold]
+        if folded:
+            raise InputError(
+                f"drape: piece {folded[0]} is half a piece on the fold; flatten the whole garment: half = false"
+            )
+        runs = [(seam.pieces, run.vertices) for seam in garment.form.seams for run in seam.runs]
+        seams = [*runs, *((pair.pieces, pair.vertices) for pair in dart_pairs(garment.form)), *seams]
     if not pieces:
         raise InputError("drape: there is no piece; give a garment or at least one flat piece")
     fabrics = {piece.fabric for piece in pieces.values()}
@@ -135,8 +195,7 @@ def sew_cloth(garment: Garment | Flattening | Sequence[Flattening], *, seams: Se
     for name, piece in pieces.items():
         if piece.flipped_faces:
             raise InputError(f"drape: piece {name} has {piece.flipped_faces} mirrored faces; relax it to the end first")
-    counts = [len(piece.positions) for piece in pieces.values()]
-    begins = dict(zip(pieces, np.concatenate([[0], np.cumsum(counts)])[:-1].tolist(), strict=True))
+    rows = piece_slices({name: piece.positions for name, piece in pieces.items()})
     # Pairs of vertices that are sewn together: along seams, and on the two sides of every cut.
     pairs: list[tuple[IntArray, IntArray]] = []
     of_surface: dict[str, IntArray] = {}
@@ -144,36 +203,16 @@ def sew_cloth(garment: Garment | Flattening | Sequence[Flattening], *, seams: Se
         origin = piece.vertex_origin
         first = np.full(len(piece.surface.vertices), -1, dtype=np.int32)
         first[origin[::-1]] = np.arange(len(origin), dtype=np.int32)[::-1]
-        of_surface[name] = first + np.int32(begins[name])
+        of_surface[name] = first + np.int32(rows[name].start)
         # The sides of a cut have doubled vertices of the surface.
-        pairs.append((np.arange(len(origin), dtype=np.int32) + np.int32(begins[name]), of_surface[name][origin]))
-    for (one, other), sides in seams:
-        pairs.append((of_surface[one][sides[0]], of_surface[other][sides[1]]))
-    welded = join_labels(sum(counts), np.concatenate([a for a, _ in pairs]), np.concatenate([b for _, b in pairs]))
-    flat = np.concatenate([piece.positions for piece in pieces.values()])
-    space = np.concatenate([piece.surface.vertices[piece.vertex_origin] for piece in pieces.values()])
-    designed = np.empty((int(welded.max()) + 1, 3))
-    designed[welded[::-1]] = space[::-1]
-    flat_faces = np.concatenate(
-        [np.where(piece.faces >= 0, piece.faces + begins[name], -1) for name, piece in pieces.items()]
-    ).astype(np.int32)
-    sizes = [len(piece.faces) for piece in pieces.values()]
-    ends = np.cumsum([0, *sizes]).tolist()
-    axes = [grain_axes(piece.grain_angle) for piece in pieces.values()]
-    return SewnCloth(
-        fabric=next(iter(pieces.values())).fabric,
-        designed=designed,
-        faces=np.where(flat_faces >= 0, welded[flat_faces], -1).astype(np.int32),
-        flat_faces=flat_faces,
-        flat=flat,
-        welded=welded,
-        warp=np.repeat([warp for warp, _ in axes], sizes, axis=0),
-        weft=np.repeat([weft for _, weft in axes], sizes, axis=0),
-        piece_faces={name: slice(ends[k], ends[k + 1]) for k, name in enumerate(pieces)},
-        piece_vertices={name: slice(begins[name], begins[name] + counts[k]) for k, name in enumerate(pieces)},
-        lines={
-            f"{name}.{line}": welded[ids + begins[name]]
-            for name, piece in pieces.items()
-            for line, ids in piece.network.surface.lines.items()
-        },
-    )
+        pairs.append((np.arange(rows[name].start, rows[name].stop, dtype=np.int32), of_surface[name][origin]))
+    pairs += [(of_surface[names[0]][sides[0]], of_surface[names[1]][sides[1]]) for names, sides in seams]
+    cloth = {
+        name: ClothPiece(
+            piece.positions, piece.faces, piece.surface.vertices[piece.vertex_origin],
+            grain_axes(piece.grain_angle)[0], piece.network.surface.lines,
+        )
+        for name, piece in pieces.items()
+    }  # fmt: skip
+    one, other = (np.concatenate(column) for column in zip(*pairs, strict=True))
+    return join_pieces(cloth, one, other, fabric=next(iter(fabrics)))

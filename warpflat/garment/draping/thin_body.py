@@ -12,7 +12,7 @@ from scipy.sparse import coo_array
 from scipy.spatial import cKDTree
 
 from warpflat.core import BoolArray, FloatArray, IntArray
-from warpflat.flat import border_loops, vertex_normals
+from warpflat.flat import border_loops, mesh_edges, vertex_normals
 from warpflat.garment.draping.body import Body
 
 __all__ = ["ThinBody", "draw_out_limbs"]
@@ -73,8 +73,7 @@ class ThinBody:
         if without is not None and passing is not None and passing.any():
             self._passing = np.flatnonzero(passing)
             kept = triangles[~without[triangles].any(axis=1)]
-            faces = np.column_stack([kept, np.full(len(kept), -1, np.int32)])
-            self._trees.append(Body(vertices, faces, device=body.device))
+            self._trees.append(Body(vertices, kept, device=body.device))
 
     def grow(self, share: float) -> None:
         """Let it grow to a share of the way from the thin body (0) to the whole one (1)."""
@@ -99,9 +98,8 @@ def _inscribed_radius(vertices: FloatArray, triangles: IntArray, normal: FloatAr
         smaller = np.einsum("ij,ij->i", off, off) / (2.0 * np.maximum(height, 1e-9))
         inside = (far < radius - 1e-5) & (height > 1e-6)
         radius = np.where(inside, np.minimum(smaller, radius), radius)
-    i, j = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).T
+    i, j = mesh_edges(triangles).T
     link = coo_array((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), shape=(len(vertices),) * 2).tocsr()
-    link.data[:] = 1.0
     share = np.maximum(np.asarray(link.sum(axis=1)).ravel(), 1.0)
     for _ in range(_SMOOTH):
         radius = 0.5 * radius + 0.5 * (link @ radius) / share

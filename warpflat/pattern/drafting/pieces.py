@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, check_label, nearest, short_repr, size_words, without_side
+from warpflat.core import FloatArray, InputError, check_label, nearest, off_line, short_repr, size_words, without_side
 from warpflat.flat import OVERLAP, overlap_width, overlapping
 from warpflat.pattern.drafting.measures import UNITS
 from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT, SAME_POINT, Dart, Edge, FoundSeam, Hole, check_points
@@ -429,9 +429,7 @@ def check_piece(
             span = float(np.linalg.norm(end - start))
             if span < SAME_POINT:
                 raise InputError(f"{where}: fold edge {edge.name!r} is closed; a fold is straight")
-            direction = (end - start) / span
-            offset = edge.points - start
-            stray = float(np.abs(offset[:, 0] * direction[1] - offset[:, 1] * direction[0]).max())
+            stray = float(off_line(edge.points, edge.points[[0, -1]]).max())
             if stray > FOLD_STRAIGHT:
                 raise InputError(
                     f"{where}: fold edge {edge.name!r} strays {stray * 1000:.2f} mm from straight; a fold strays at most "

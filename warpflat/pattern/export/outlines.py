@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from warpflat.core import FloatArray, InputError, format_count, quote_value
+from warpflat.core import FloatArray, InputError, format_count, off_line, quote_value
 from warpflat.flat import join_labels
 from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT
 
@@ -155,12 +155,6 @@ def simple_ring(points: FloatArray, where: str) -> FloatArray:
             f"{where}: its outline crosses itself at ({1e3 * x:.1f}, {1e3 * y:.1f}) mm, beyond a corner; a piece has one outer line"
         )
     return np.asarray(parts[0].exterior.coords)[:-1]
-
-
-def off_line(points: FloatArray, line: FloatArray) -> FloatArray:
-    """Return #P, the distances [m] of points (#P by 2 [m]) from a straight line (2 by 2 [m]) that goes on both ways."""
-    (x, y), away = line[1] - line[0], points - line[0]
-    return np.asarray(np.abs(away[:, 0] * y - away[:, 1] * x) / np.hypot(x, y))
 
 
 def counted(names: Sequence[str]) -> str:

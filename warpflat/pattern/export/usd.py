@@ -10,16 +10,15 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from warpflat._version import __version__
-from warpflat.core import FloatArray, InputError, IntArray, atomic_path, hidden_file, require_writable
+from warpflat.core import FloatArray, InputError, atomic_path, hidden_file, require_writable
 from warpflat.flat import Surface, triangulate, vertex_normals
 from warpflat.pattern.export.colours import VertexColours, energy_scale
 from warpflat.pattern.export.geometry import Polylines, face_areas, polylines_of
@@ -33,7 +32,6 @@ from warpflat.pattern.export.usd_prims import (
     add_texture_coordinates,
     begin_stage,
     bounding_box,
-    define_energy_mesh,
     define_group,
     define_mesh,
     last_values_as_defaults,
@@ -52,28 +50,47 @@ __all__ = ["DRAFTED", "FrameWriter", "film_scale"]
 DRAFTED = "/World/drafted"
 
 
-@dataclass(kw_only=True)
 class FramePiece:
     """State of a piece: a few arrays of its size, whatever the number of frames."""
 
-    name: str
-    surface: Surface
-    path: str
-    colours: tuple[VertexColours, VertexColours]  # of surface and pattern; one and the same until a cut
-    on_surface: MeshSamples
-    on_pattern: MeshSamples
-    surface_cuts: SampledLines
-    pattern_lines: SampledLines
-    pattern_cuts: SampledLines
-    faces: IntArray
-    to_surface: IntArray
-    lines: dict[str, Polylines]
-    cuts: dict[str, Polylines] = field(default_factory=dict)
-    measures: dict[str, Any] = field(default_factory=dict)
-    frames: int = 0
-    last_positions: NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 2), dtype=np.float32))
-    low: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
-    high: FloatArray = field(default_factory=lambda: np.full(2, -np.inf))
+    def __init__(self, stage: Any, path: str, surface: Surface, *, scale: float) -> None:
+        """Author the surface with its feature lines, and prepare the pattern.
+
+        Args:
+            stage, path: where.
+            surface: the piece in space.
+            scale: upper end of the colours [J/m2].
+        """
+        from pxr import Usd
+
+        self.surface, self.path = surface, path
+        points = np.asarray(surface.vertices, dtype=np.float32)
+        size = float(np.linalg.norm(np.ptp(surface.vertices, axis=0))) if len(points) else 0.0
+        width = float(np.clip(0.004 * size, 1e-5, 2e-3))
+
+        def lines(below: str, colour: tuple[float, float, float]) -> SampledLines:
+            return SampledLines(stage, part_path(path, below), start=FIRST_FRAME, width=width, colour=colour)
+
+        default = Usd.TimeCode.Default()
+        normals = vertex_normals(surface.vertices, triangulate(surface.faces)[0])
+        self.on_surface = MeshSamples(stage, part_path(path, "surface"), normals=normals, per_face=False, scale=scale)
+        self.on_surface.write(default, points, surface.faces)
+        # Cuts change the number of vertices and never that of faces: one normal per face serves all frames.
+        upright = np.tile([0.0, 0.0, 1.0], (len(surface.faces), 1))
+        self.on_pattern = MeshSamples(stage, part_path(path, "pattern"), normals=upright, per_face=True, scale=scale)
+        self.lines = polylines_of(surface.lines)
+        self.cuts = dict[str, Polylines]()
+        lines("surface_lines", _LINE_COLOUR).write(default, self.lines, points, changed=True)
+        self.surface_cuts = lines("surface_cuts", _CUT_COLOUR)
+        self.pattern_lines, self.pattern_cuts = lines("pattern_lines", _LINE_COLOUR), lines("pattern_cuts", _CUT_COLOUR)
+        colours = VertexColours(surface.faces, face_areas(surface.vertices, surface.faces), len(points))
+        self.colours = colours, colours  # of surface and pattern; one and the same until a cut
+        self.faces = surface.faces
+        self.to_surface = np.arange(len(points), dtype=np.int32)
+        self.measures = dict[str, Any]()
+        self.frames = 0
+        self.last_positions = np.empty((0, 2), dtype=np.float32)
+        self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
 
     def change_faces(self, faces: ArrayLike | None, count: int, what: str) -> bool:
         """Take over new faces of a pattern with `count` vertices, and return whether they differ from those before.
@@ -99,7 +116,7 @@ class FramePiece:
         return True
 
     def change_lines(
-        self, lines: Mapping[str, Any] | None, cuts: Mapping[str, Any] | None, count: int, *, new_faces: bool
+        self, lines: Mapping[str, Any] | None, cuts: Mapping[str, Any] | None, count: int, what: str, *, new_faces: bool
     ) -> bool:
         """Take over new lines and cuts of a pattern with `count` vertices, and return whether they or the faces are new.
 
@@ -112,9 +129,7 @@ class FramePiece:
         self.cuts = self.cuts if cuts is None else polylines_of(cuts)
         for line, parts in (*self.lines.items(), *self.cuts.items()):
             if any(part.max() >= count or part.min() < 0 for part in parts):
-                raise ValueError(
-                    f"line {line!r} of piece {self.name!r} refers to vertices beyond the {count} positions"
-                )
+                raise ValueError(f"{what}: line {line!r} refers to vertices beyond the {count} positions")
         return True
 
     def cuts_on_surface(self) -> dict[str, Polylines]:
@@ -249,48 +264,13 @@ class FrameWriter:
         Raises:
             ValueError: the name is taken.
         """
-        from pxr import Kind, Usd
+        from pxr import Kind
 
         if name in self._pieces:
             raise ValueError(f"piece {name!r} is already in the file")
         path = f"/World/{valid_name(name, self._used_names)}"
         define_group(self._stage, path, label=name, kind=Kind.Tokens.component)
-        points = np.asarray(surface.vertices, dtype=np.float32)
-        size = float(np.linalg.norm(np.ptp(surface.vertices, axis=0))) if len(points) else 0.0
-        width = float(np.clip(0.004 * size, 1e-5, 2e-3))
-
-        def group(below: str, colour: tuple[float, float, float]) -> SampledLines:
-            return SampledLines(self._stage, part_path(path, below), start=FIRST_FRAME, width=width, colour=colour)
-
-        default = Usd.TimeCode.Default()
-        triangles, _ = triangulate(surface.faces)
-        normals = vertex_normals(surface.vertices, triangles)
-        on_surface = MeshSamples(
-            define_energy_mesh(self._stage, part_path(path, "surface"), normals, per_face=False), self._scale
-        )
-        on_surface.write(default, points, surface.faces)
-        # Cuts change the number of vertices and never that of faces: one normal per face serves all frames.
-        upright = np.tile([0.0, 0.0, 1.0], (len(surface.faces), 1))
-        on_pattern = MeshSamples(
-            define_energy_mesh(self._stage, part_path(path, "pattern"), upright, per_face=True), self._scale
-        )
-        lines = polylines_of(surface.lines)
-        group("surface_lines", _LINE_COLOUR).write(default, lines, points, changed=True)
-        colours = VertexColours(surface.faces, face_areas(surface.vertices, surface.faces), len(points))
-        self._pieces[name] = FramePiece(
-            name=name,
-            surface=surface,
-            path=path,
-            colours=(colours, colours),
-            on_surface=on_surface,
-            on_pattern=on_pattern,
-            surface_cuts=group("surface_cuts", _CUT_COLOUR),
-            pattern_lines=group("pattern_lines", _LINE_COLOUR),
-            pattern_cuts=group("pattern_cuts", _CUT_COLOUR),
-            faces=surface.faces,
-            to_surface=np.arange(len(surface.vertices), dtype=np.int32),
-            lines=lines,
-        )
+        self._pieces[name] = FramePiece(self._stage, path, surface, scale=self._scale)
 
     def write_map(self, name: str, key: str, values: FloatArray, *, unit: str, state: str) -> None:
         """Write a value per face of a piece's pattern, see :func:`warpflat.pattern.export.usd_prims.set_face_map`."""
@@ -361,7 +341,7 @@ class FrameWriter:
         flat = np.asarray(positions, dtype=np.float32)
         density = np.asarray(face_energy_density, dtype=np.float32)
         number = FIRST_FRAME + piece.frames
-        what = f"frame {number} of piece {piece.surface.name!r}"
+        what = f"frame {number} of piece {name!r}"
         # Check the shapes and values of a frame.
         face_count = len(piece.surface.faces)
         if flat.ndim != 2 or flat.shape[1] != 2 or len(flat) == 0:
@@ -373,7 +353,7 @@ class FrameWriter:
         new_faces = piece.change_faces(faces, len(flat), what) or piece.frames == 0
         if len(flat) != len(piece.to_surface):
             raise ValueError(f"{what}: {len(flat)} positions for {len(piece.to_surface)} pattern vertices")
-        new_lines = piece.change_lines(lines, cuts, len(flat), new_faces=new_faces)
+        new_lines = piece.change_lines(lines, cuts, len(flat), what, new_faces=new_faces)
 
         time = Usd.TimeCode(number)
         points = np.zeros((len(flat), 3), dtype=np.float32)

@@ -32,7 +32,6 @@ __all__ = [
     "add_texture_coordinates",
     "begin_stage",
     "bounding_box",
-    "define_energy_mesh",
     "define_group",
     "define_mesh",
     "export_stage",
@@ -179,27 +178,6 @@ def last_values_as_defaults(stage: Any, prims: Iterable[Any]) -> None:
                 attribute.Set(attribute.Get(stage.GetEndTimeCode()))
 
 
-def define_energy_mesh(stage: Any, path: str, normals: FloatArray, *, per_face: bool) -> Any:
-    """Define a mesh with energy density per face and colour per vertex.
-
-    Args:
-        stage, path: where.
-        normals: for the whole time; #F by 3 if `per_face`, else #V by 3.
-        per_face: whose normals they are.
-    """
-    from pxr import Sdf, UsdGeom, Vt
-
-    mesh = define_mesh(stage, path)
-    mesh.CreateNormalsAttr().Set(Vt.Vec3fArray.FromNumpy(normals.astype(np.float32)))
-    mesh.SetNormalsInterpolation(UsdGeom.Tokens.uniform if per_face else UsdGeom.Tokens.vertex)
-    density = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(
-        "strainEnergyDensity", Sdf.ValueTypeNames.FloatArray, UsdGeom.Tokens.uniform
-    )
-    density.GetAttr().SetCustomDataByKey("unit", "J/m2")
-    mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
-    return mesh
-
-
 def set_face_map(layer: Any, mesh: str, key: str, values: FloatArray, *, unit: str, state: str) -> None:
     """Author a value per face of a mesh that a layer has, as a primvar; one that is there is replaced.
 
@@ -228,22 +206,31 @@ def bounding_box(points: NDArray[Any], margin: float = 0.0) -> NDArray[Any]:
 
 
 class MeshSamples:
-    """Samples of one mesh: points, energies and colours of computed layouts, topology only where it changes."""
+    """A mesh over time: points, energies of faces and colours of vertices of computed layouts, topology only where it changes."""
 
-    def __init__(self, mesh: Any, scale: float) -> None:
-        """
+    def __init__(self, stage: Any, path: str, *, normals: FloatArray, per_face: bool, scale: float) -> None:
+        """Define the mesh.
+
         Args:
-            mesh: of :func:`define_energy_mesh`.
+            stage, path: where.
+            normals: for the whole time; #F by 3 if `per_face`, else #V by 3.
+            per_face: whose normals they are.
             scale: energy of the last colour [J/m2].
         """
-        from pxr import UsdGeom
+        from pxr import Sdf, UsdGeom, Vt
 
-        self.mesh = mesh
-        self._density = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("strainEnergyDensity").GetAttr()
-        self._colours = mesh.GetDisplayColorPrimvar().GetAttr()
-        self._colours.SetCustomData(
-            {"quantity": "strainEnergyDensity", "unit": "J/m2", "rangeMin": 0.0, "rangeMax": float(scale)}
+        quantity, unit = "strainEnergyDensity", "J/m2"
+        self.mesh = define_mesh(stage, path)
+        self.mesh.CreateNormalsAttr().Set(Vt.Vec3fArray.FromNumpy(normals.astype(np.float32)))
+        self.mesh.SetNormalsInterpolation(UsdGeom.Tokens.uniform if per_face else UsdGeom.Tokens.vertex)
+        self._density = (
+            UsdGeom.PrimvarsAPI(self.mesh)
+            .CreatePrimvar(quantity, Sdf.ValueTypeNames.FloatArray, UsdGeom.Tokens.uniform)
+            .GetAttr()
         )
+        self._density.SetCustomDataByKey("unit", unit)
+        self._colours = self.mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex).GetAttr()
+        self._colours.SetCustomData({"quantity": quantity, "unit": unit, "rangeMin": 0.0, "rangeMax": float(scale)})
         self._stored = 0
         self._padding = 0
         self._points: Any = None
