@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["WIDTHS", "Cloth", "Copy", "Marker", "cloth_needed", "make_marker"]
 
 
-#: Copies are nested as polygons that are larger by up to this [m] and have far fewer corners.
+#: Copies with many corners are nested as polygons that are larger by up to this [m] and have at most half as many.
 SIMPLER = 1e-3
 #: Height of capitals [m] of a copy's name and of its other lines, the least share of these, and their distances [m]
 #: from lines, the second where there is little room.
@@ -245,11 +245,12 @@ def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seco
             )
         matrices.append(matrix)
         angles = [0.0] if cloth.one_way else [0.0, 180.0]
-        # A polygon with few corners that contains the cut line.
+        # A polygon with few corners that contains the cut line. Half a millimetre all around costs cloth, so it must pay.
         exact = shapely.Polygon(cut)
         with np.errstate(invalid="ignore"):  # a flag of GEOS's tries; what comes out is checked
             simple = exact.buffer(SIMPLER / 2, join_style="mitre", mitre_limit=2).simplify(SIMPLER / 2)
-        simple = simple if simple.contains(exact) else exact
+        fewer = 2 * shapely.get_num_coordinates(simple) < shapely.get_num_coordinates(exact)
+        simple = simple if fewer and simple.contains(exact) else exact
         corners = np.asarray(shapely.orient_polygons(shapely.Polygon(simple.exterior)).exterior.coords)[:-1]
         items.append(spyrrow.Item(str(index), [(x * 1000, y * 1000) for x, y in corners.tolist()], 1, angles))
     instance = spyrrow.StripPackingInstance(name, usable * 1000, items)
