@@ -10,6 +10,9 @@ from warpflat.core.vectors import unit
 
 __all__ = ["area_vectors", "face_normals", "mean_normals", "vertex_normals"]
 
+# Faces around a vertex cancel below this share of their area.
+_CANCEL = 1e-9
+
 
 def area_vectors(positions: FloatArray, faces: NDArray[np.integer]) -> FloatArray:
     """Return the normals of triangles (#F by 3) or quads (#F by 4) over `positions` (#V by 2 or 3), as long as their areas [m2]."""
@@ -33,4 +36,8 @@ def vertex_normals(positions: FloatArray, faces: NDArray[np.integer]) -> FloatAr
 def mean_normals(vectors: FloatArray, faces: NDArray[np.integer], count: int) -> FloatArray:
     """Return the unit normals of `count` vertices, as `vertex_normals` does, by area vectors (#F by 3)."""
     corners, each = faces.T.ravel(), faces.shape[1]
-    return unit(np.column_stack([np.bincount(corners, np.tile(axis, each), count) for axis in vectors.T]))
+    total = np.column_stack([np.bincount(corners, np.tile(axis, each), count) for axis in vectors.T])
+    areas = np.bincount(corners, np.tile(np.linalg.norm(vectors, axis=1), each), count)
+    # Faces that lie on each other, as a mouth's lining, cancel but for rounding.
+    total[np.linalg.norm(total, axis=1) < _CANCEL * areas] = 0.0
+    return unit(total)
