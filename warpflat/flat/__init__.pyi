@@ -64,6 +64,8 @@ from .flattening.progress import CONTACT as CONTACT
 from .flattening.progress import STEPS as STEPS
 from .flattening.progress import Progress as Progress
 from .flattening.progress import Stage as Stage
+from .flattening.progress import make_stage as make_stage
+from .flattening.progress import make_stages as make_stages
 from .flattening.progress import relaxation_words as relaxation_words
 from .flattening.result import Flattening as Flattening
 from .flattening.result import run_metrics as run_metrics
