@@ -8,8 +8,8 @@ import numpy as np
 
 from warpflat.core import file_in, latest_file, optional_file, output_folder
 from warpflat.flat import Surface
-from warpflat.garment.draping.frames import write_drape_film, write_drape_frames
-from warpflat.garment.draping.picture import write_drape_picture
+from warpflat.garment.draping.frames import write_drape_frames
+from warpflat.garment.draping.picture import write_drape_film, write_drape_picture
 from warpflat.garment.draping.result import Drape
 from warpflat.pattern import write_obj, write_sewn_usd
 
