@@ -60,7 +60,6 @@ from .draping.body import Body as Body
 from .draping.correct_pattern import Correction as Correction
 from .draping.correct_pattern import correct_pattern as correct_pattern
 from .draping.correct_pattern import relieve_pattern as relieve_pattern
-from .draping.correction_picture import write_correction_picture as write_correction_picture
 from .draping.drape_garment import drape as drape
 from .draping.drape_pattern import Placement as Placement
 from .draping.drape_pattern import drape_pattern as drape_pattern
@@ -72,6 +71,7 @@ from .draping.lift import surface_lift as surface_lift
 from .draping.moved_pattern import moved_outlines as moved_outlines
 from .draping.options import DrapeOptions as DrapeOptions
 from .draping.picture import write_compared_drapes as write_compared_drapes
+from .draping.picture import write_correction_picture as write_correction_picture
 from .draping.recover_pattern import Recovery as Recovery
 from .draping.recover_pattern import recover_pattern as recover_pattern
 from .draping.result import Drape as Drape

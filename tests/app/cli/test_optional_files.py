@@ -41,7 +41,7 @@ SURFACE = {
 DRAPE = {
     "drape.png": "warpflat.garment.draping.write.write_drape_picture",
     "drape.webp": "warpflat.garment.draping.write.write_drape_film",
-    "corrected.png": "warpflat.garment.draping.correction_picture.write_correction_picture",
+    "corrected.png": "warpflat.garment.draping.picture.write_correction_picture",
 }
 GARMENT = {
     "picture.png": "warpflat.pattern.export.picture._Band.draw",

@@ -22,8 +22,7 @@ from warpflat.flat.fabric.limits import Amount, Demand
 from warpflat.flat.model.fit import MAPS as MAPS_OF_FIT
 from warpflat.flat.model.fit import Misfit, WornFit
 from warpflat.garment.draping.correct_pattern import Correction
-from warpflat.garment.draping.correction_picture import write_correction_picture
-from warpflat.garment.draping.picture import write_compared_drapes, write_drape_picture
+from warpflat.garment.draping.picture import write_compared_drapes, write_correction_picture, write_drape_picture
 from warpflat.pattern.drafting.drafted import SeamReport
 from warpflat.pattern.drafting.walked import WalkedSeam
 from warpflat.pattern.export.dressed import Body

@@ -8,7 +8,7 @@ import json
 import os
 import re
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from importlib import resources
 from pathlib import Path
@@ -80,8 +80,9 @@ def review_folder(folder: str | Path) -> Path:
     folder = Path(folder)
     metrics, files, name = read_run(folder)
     with output_folder(folder, ["review.html"], guard=True):
+        film = pack_foreign_film(folder / "frames.usdc") if "frames.usdc" in files else None
         with guarded(folder / "metrics.json", "JSON"):
-            write_review(folder, metrics, files, name=name, film=lambda: pack_foreign_film(folder / "frames.usdc"))
+            write_review(folder, metrics, files, name=name, film=film)
         record_file(folder, name, "review.html")
     return folder / "review.html"
 
@@ -125,7 +126,7 @@ def write_review(
     files: Sequence[str],
     *,
     name: str,
-    film: Callable[[], Mapping[str, Any] | None] | None = None,
+    film: Mapping[str, Any] | None,
     pictures: Mapping[str, str] | None = None,
 ) -> str:
     """Write `review.html` and return its name.
@@ -135,7 +136,7 @@ def write_review(
         metrics: as `metrics.json`.
         files: what the run has written, by name.
         name: of the run.
-        film: gives what `pack_frames` has made of this folder, if it was called before.
+        film: what :func:`pack_frames` has made of this folder; None if that cannot be shown.
         pictures: of :func:`pack_pictures`, those that were packed before.
 
     Raises:
@@ -143,7 +144,7 @@ def write_review(
     """
     report_activity("writing the review page")
     path = folder / "review.html"
-    page = _page(folder, metrics, files, name, film or (lambda: pack_frames(folder)), pictures or {})
+    page = _page(folder, metrics, files, name, film, pictures or {})
     with atomic_path(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
     return path.name
@@ -154,51 +155,12 @@ def _page(
     metrics: Mapping[str, Any],
     files: Sequence[str],
     name: str,
-    packed_film: Callable[[], Mapping[str, Any] | None],
+    film: Mapping[str, Any] | None,
     pictures: Mapping[str, str],
 ) -> str:
-    film, packed = "", None
-    if "frames.usdc" in files:
-        packed = packed_film()
-        film = "<p>The film is too large for a page, or could not be packed; see frames.usdc.</p>"
-        if packed:
-            # No text of a film may end the script it stands in.
-            data = json.dumps(packed, separators=(",", ":")).replace("<", "\\u003c")
-            buttons = "".join(
-                f'<button data-view="{view}">{view.capitalize()}</button>'
-                for view in ("all", "front", "side", "back", "pattern")
-            )
-            hint = "point at the cloth for its value; click a piece to single it out; drag to turn, shift-drag to move, ctrl-wheel to zoom"
-            scale = (
-                f'<span id="low">0</span> <i style="background:linear-gradient(90deg,{Scale(high=1.0).css()})"></i> '
-            )
-            scale += f'<span id="high">{packed["scale"]:.3g} J/m²</span>'
-            if packed["scale"] <= SMALLEST_SCALE:
-                scale = "No strain energy: the cloth lies flat without strain"
-            maps = "".join(
-                f'<option value="{key}">{words}</option>'
-                for key, words in (
-                    ("energy", "strain energy"),
-                    ("warp", "strain along the warp"),
-                    ("weft", "strain along the weft"),
-                    *((key, _MAPS[key] + _STATES.get(each["state"], "")) for key, each in packed["maps"].items()),
-                )
-            )
-            speeds = "".join(
-                f'<option value="{x:g}"{" selected" if x == 1 else ""}>{x:g} x</option>' for x in (0.25, 0.5, 1, 2)
-            )
-            body = '<label><input id="body" type="checkbox" checked> body</label>'
-            body = body if any(still["kind"] == "body" for still in packed["still"]) else ""
-            film = (
-                f'<div class="stage"><canvas id="view" role="img" tabindex="0" aria-label="the cloth in space and its pattern, '
-                f'coloured by strain; the tables below have the numbers"></canvas><div class="bar"><button id="play">Play</button>'
-                f'<input id="slider" type="range" min="0" value="0" aria-label="frame">'
-                f'<label>speed <select id="speed">{speeds}</select></label><label><input id="loop" type="checkbox"> loop</label>'
-                f'<label>map <select id="map">{maps}</select></label>{body}{buttons}</div>'
-                f'<div class="scale">{scale}<span id="value" aria-live="polite"></span></div>'
-                f'<div class="scale"><span id="label"></span>{hint}</div></div>'
-                f'<script id="film" type="application/json">{data}</script>'
-            )
+    shown_film = "" if film is None else _film(film)
+    if film is None and "frames.usdc" in files:
+        shown_film = "<p>The film is too large for a page, or could not be packed; see frames.usdc.</p>"
     notes = [(f"{piece}: {note}") for piece, entry in metrics["pieces"].items() for note in entry.get("notes", ())]
     shown = {**pack_pictures(folder, [file for file in files if file not in pictures]), **pictures}
     # What pictures show, for who does not see them.
@@ -218,30 +180,6 @@ def _page(
         text = base64.b64encode(_bytes(latest_file(folder / file))).decode("ascii")
         words = f"The pattern of {escape(name)}: cutting and sewing lines, notches and labels"
         drawings.append(_thumbnail(words, f"data:image/svg+xml;base64,{text}"))
-    pieces = metrics["pieces"].values()
-    area = sum(piece["area_m2"] for piece in pieces)
-    fits = [piece["wear"] for piece in pieces if piece.get("wear")]
-    stretch = max((each[f"strain_{way}"]["p95"] for each in fits for way in ("warp", "weft")), default=0.0)
-    if stretch > STRETCHED and metrics.get("verdict", {}).get("fits"):
-        # Cloth that is meant to stretch differs from the body by that, which is no error.
-        limit = max(each["strain_limit"] for each in fits)
-        differs = [(f"{100 * stretch:.0f} % of {100 * limit:.0f} %", "stretch when worn, of what the cloth allows")]
-    else:
-        differs = [
-            (f"{100 * max(piece['length_error'] for piece in pieces):.2g} %", "largest length error"),
-            (f"{100 * max(piece['area_error'] for piece in pieces):.2g} %", "largest area error"),
-        ]
-    cards = [
-        (energy_words(sum(piece["strain_energy_j"] for piece in pieces)), "strain energy"),
-        *differs,
-        (f"{area:.3g} m²", "cloth"),
-        (str(len(metrics["pieces"])), "piece" if len(metrics["pieces"]) == 1 else "pieces"),
-        (", ".join(sorted({piece["fabric"] for piece in pieces})), "fabric"),
-    ]
-    if metrics.get("seams"):
-        worst = max(abs(seam["difference_mm"]) for seam in metrics["seams"])
-        cards.insert(3, (f"{worst:.2f} mm", "largest seam difference"))
-    boxes = "".join(f'<div class="card"><b>{escape(value)}</b><span>{what}</span></div>' for value, what in cards)
     # Size, errors and energy of every piece.
     rows = [
         (
@@ -270,9 +208,9 @@ def _page(
         for file in sorted(set(files), key=lambda file: (file != "pattern.pdf", file))
     )
     sections = [
-        ("", f'{verdict_words(metrics)}<div class="cards">{boxes}</div>'),
+        ("", verdict_words(metrics) + _cards(metrics)),
         ("Ease", ease_table(metrics)),
-        ("From the development to rest", film),
+        ("From the development to rest", shown_film),
         ("Worn: from the designed surface to rest", worn),
         ("Pictures", f'<div class="thumbnails">{"".join(images + drawings)}</div>' if images or drawings else ""),
     ]
@@ -288,7 +226,7 @@ def _page(
     ]
     body = "".join(f"<h2>{title}</h2>{content}" if title else content for title, content in sections if content)
     body += "".join(f"<details><summary>{title}</summary>{content}</details>" for title, content in folded if content)
-    script = f"<script>{_data('viewer.js')}</script>" if packed else ""
+    script = f"<script>{_data('viewer.js')}</script>" if film else ""
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{escape(name)} - review</title>'
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">'
@@ -296,6 +234,74 @@ def _page(
         f'<body><main><h1>{escape(name)}</h1><p class="sub">warpflat {escape(str(metrics["warpflat"]))}</p>'
         f"{body}</main>{script}</body></html>\n"
     )
+
+
+def _film(packed: Mapping[str, Any]) -> str:
+    """Return the film with its buttons and scales as HTML."""
+    # No text of a film may end the script it stands in.
+    data = json.dumps(packed, separators=(",", ":")).replace("<", "\\u003c")
+    buttons = "".join(
+        f'<button data-view="{view}">{view.capitalize()}</button>'
+        for view in ("all", "front", "side", "back", "pattern")
+    )
+    hint = "point at the cloth for its value; click a piece to single it out; drag to turn, shift-drag to move, ctrl-wheel to zoom"
+    scale = f'<span id="low">0</span> <i style="background:linear-gradient(90deg,{Scale(high=1.0).css()})"></i> '
+    scale += f'<span id="high">{packed["scale"]:.3g} J/m²</span>'
+    if packed["scale"] <= SMALLEST_SCALE:
+        scale = "No strain energy: the cloth lies flat without strain"
+    maps = "".join(
+        f'<option value="{key}">{words}</option>'
+        for key, words in (
+            ("energy", "strain energy"),
+            ("warp", "strain along the warp"),
+            ("weft", "strain along the weft"),
+            *((key, _MAPS[key] + _STATES.get(each["state"], "")) for key, each in packed["maps"].items()),
+        )
+    )
+    speeds = "".join(
+        f'<option value="{x:g}"{" selected" if x == 1 else ""}>{x:g} x</option>' for x in (0.25, 0.5, 1, 2)
+    )
+    body = '<label><input id="body" type="checkbox" checked> body</label>'
+    body = body if any(still["kind"] == "body" for still in packed["still"]) else ""
+    return (
+        f'<div class="stage"><canvas id="view" role="img" tabindex="0" aria-label="the cloth in space and its pattern, '
+        f'coloured by strain; the tables below have the numbers"></canvas><div class="bar"><button id="play">Play</button>'
+        f'<input id="slider" type="range" min="0" value="0" aria-label="frame">'
+        f'<label>speed <select id="speed">{speeds}</select></label><label><input id="loop" type="checkbox"> loop</label>'
+        f'<label>map <select id="map">{maps}</select></label>{body}{buttons}</div>'
+        f'<div class="scale">{scale}<span id="value" aria-live="polite"></span></div>'
+        f'<div class="scale"><span id="label"></span>{hint}</div></div>'
+        f'<script id="film" type="application/json">{data}</script>'
+    )
+
+
+def _cards(metrics: Mapping[str, Any]) -> str:
+    """Return what one looks for first as HTML: energy, errors, cloth, pieces and fabric."""
+    pieces = metrics["pieces"].values()
+    area = sum(piece["area_m2"] for piece in pieces)
+    fits = [piece["wear"] for piece in pieces if piece.get("wear")]
+    stretch = max((each[f"strain_{way}"]["p95"] for each in fits for way in ("warp", "weft")), default=0.0)
+    if stretch > STRETCHED and metrics.get("verdict", {}).get("fits"):
+        # Cloth that is meant to stretch differs from the body by that, which is no error.
+        limit = max(each["strain_limit"] for each in fits)
+        differs = [(f"{100 * stretch:.0f} % of {100 * limit:.0f} %", "stretch when worn, of what the cloth allows")]
+    else:
+        differs = [
+            (f"{100 * max(piece['length_error'] for piece in pieces):.2g} %", "largest length error"),
+            (f"{100 * max(piece['area_error'] for piece in pieces):.2g} %", "largest area error"),
+        ]
+    cards = [
+        (energy_words(sum(piece["strain_energy_j"] for piece in pieces)), "strain energy"),
+        *differs,
+        (f"{area:.3g} m²", "cloth"),
+        (str(len(metrics["pieces"])), "piece" if len(metrics["pieces"]) == 1 else "pieces"),
+        (", ".join(sorted({piece["fabric"] for piece in pieces})), "fabric"),
+    ]
+    if metrics.get("seams"):
+        worst = max(abs(seam["difference_mm"]) for seam in metrics["seams"])
+        cards.insert(3, (f"{worst:.2f} mm", "largest seam difference"))
+    boxes = "".join(f'<div class="card"><b>{escape(value)}</b><span>{what}</span></div>' for value, what in cards)
+    return f'<div class="cards">{boxes}</div>'
 
 
 def verdict_words(metrics: Mapping[str, Any]) -> str:

@@ -215,7 +215,7 @@ def _run(
             measured["verdict"] = verdict.as_dict()
         if reviewed:
             with optional_file(page, files):
-                write_review(folder, measured, tuple(files), name=scene.name, film=lambda: packed, pictures=shown)
+                write_review(folder, measured, tuple(files), name=scene.name, film=packed, pictures=shown)
 
     # The body belongs to the film.
     known = [*files, *([MANNEQUIN] if latest_file(folder / MANNEQUIN) != folder / MANNEQUIN else [])]

@@ -7,14 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, arc_lengths, find_unused_name, off_line, part_between
+from warpflat.core import FloatArray, InputError, arc_lengths, off_line, part_between, points_at_lengths, reflected
 from warpflat.garment.construction.edges import (
-    ON_EDGE,
     backwards,
     beside,
     direction,
     downwards,
-    mirrored,
+    drawn_on,
+    joined,
+    lines_ending_on,
     runs_down,
     trimmed,
     with_edges,
@@ -81,10 +82,10 @@ def with_button_stand(piece: Piece, name: str, opening: Opening, end: float, dep
     top, low = edge.points[[0, -1]]
     along = direction(edge.points)
     reach = _reflected(upper.points[::-1], top, out, opening.width)
-    new = {upper.name: [replace(upper, points=np.vstack([upper.points, reach[1:]]))]}
+    new = {upper.name: [replace(upper, points=joined(upper.points, reach))]}
     if end > edge.length - 1e-6:
         foot = _reflected(lower.points, low, out, opening.width)
-        new[lower.name] = [replace(lower, points=np.vstack([foot[::-1], lower.points[1:]]))]
+        new[lower.name] = [replace(lower, points=joined(foot[::-1], lower.points))]
         below = []
     else:
         foot = top + end * along + np.outer([0.0, opening.width], out)
@@ -92,19 +93,15 @@ def with_button_stand(piece: Piece, name: str, opening: Opening, end: float, dep
         step = Edge(name=f"{name} {STAND_END}", points=foot[::-1])
         below = [step, replace(edge, points=np.vstack([foot[0], rest]))]
     new[name] = [Edge(name=f"{name} {STAND}", points=np.array([reach[-1], foot[-1]])), *below]
-    lines = dict(piece.internal_lines)
-    lines = {find_unused_name(name, lines): np.array([top, (top + min(end, edge.length) * along)]), **lines}
     # A mark for each button, and a line for each buttonhole across the stand.
     assert opening.buttons is not None
-    marks = dict(piece.marks)
-    for depth in depths:
-        centre = top + depth * along
-        marks[find_unused_name("button", marks)] = centre
+    centres = [top + depth * along for depth in depths]
+    lines = [(name, np.array([top, (top + min(end, edge.length) * along)]))]
+    for centre in centres:
         ends = centre + np.outer([_SHANK, _SHANK - opening.buttons.diameter - _THICKNESS], out)
-        lines[find_unused_name("buttonhole", lines)] = ends
-        for end in ends:
-            lines[find_unused_name("buttonhole end", lines)] = end + np.outer([-_BAR, _BAR], along)
-    return replace(_with_sides(piece, name, new), internal_lines=lines, marks=marks)
+        bars = [("buttonhole end", end + np.outer([-_BAR, _BAR], along)) for end in ends]
+        lines += [("buttonhole", ends), *bars]
+    return drawn_on(_with_sides(piece, name, new), lines, [("button", centre) for centre in centres])
 
 
 def with_wrap(piece: Piece, name: str, opening: Opening) -> Piece:
@@ -122,38 +119,34 @@ def with_wrap(piece: Piece, name: str, opening: Opening) -> Piece:
     Raises:
         InputError: the edge is not straight, or one beside it is shorter than the wrap is wide.
     """
-    import shapely
-
     upper, edge, lower, out = _down_its_edge(piece, name, "be wrapped")
     centre = edge.points
 
-    def reflected(edge: Edge, line: FloatArray) -> FloatArray:
+    def beyond(edge: Edge, line: FloatArray) -> FloatArray:
         if edge.length < opening.width + _LEAST_LEFT:
             raise InputError(
                 f"{piece.name}.{edge.name} is {1e3 * edge.length:.0f} mm long up to its next corner or dart, too short for a wrap of "
                 f"{1e3 * opening.width:.0f} mm"
             )
-        return mirrored(part_between(line, 0.0, opening.width), line[0], out)
+        return reflected(part_between(line, 0.0, opening.width), out, float(line[0] @ out))
 
-    foot = reflected(lower, lower.points)
+    foot = beyond(lower, lower.points)
     if upper.name == "neck":
-        corner, line = foot[-1], shapely.LineString(centre)
-        waists = [each[[0, -1]] for key, each in piece.internal_lines.items() if key.startswith("waist")]
-        crossed = [end for ends in waists for end in ends if line.distance(shapely.Point(end)) < ON_EDGE]
-        head = np.array([upper.points[0], crossed[0] + opening.width * out if crossed else corner])
+        waists = _met_by(piece, centre, "waist")
+        corner = points_at_lengths(centre, waists[0]) + opening.width * out if waists else foot[-1]
+        head = np.array([upper.points[0], corner])
     else:
-        head = np.vstack([upper.points, reflected(upper, upper.points[::-1])[1:]])
+        head = joined(upper.points, beyond(upper, upper.points[::-1]))
     new = {
         upper.name: [replace(upper, points=head)],
         name: [],
-        lower.name: [replace(lower, points=np.vstack([foot[::-1], lower.points[1:]]))],
+        lower.name: [replace(lower, points=joined(foot[::-1], lower.points))],
     }
     if np.linalg.norm(foot[-1] - head[-1]) > _LEAST_LEFT:
         points = np.array([head[-1], foot[-1]])
         new[name] = [Edge(name="wrap edge", points=points, kind="hem", allowance=_WRAP_HEM)]
-    lines = {**piece.internal_lines, find_unused_name(name, piece.internal_lines): centre}
-    tie = {"tie": head[-1]} if opening.tie and (upper.name != "neck" or new[name]) else {}
-    wrapped = _with_sides(replace(piece, internal_lines=lines, marks={**piece.marks, **tie}), name, new)
+    tie = [("tie", head[-1])] if opening.tie and (upper.name != "neck" or new[name]) else []
+    wrapped = drawn_on(_with_sides(piece, name, new), [(name, centre)], tie)
     return trimmed(wrapped, wrapped.edges)
 
 
@@ -202,7 +195,8 @@ def _reflected(points: FloatArray, corner: FloatArray, out: FloatArray, width: f
     away = np.maximum.accumulate(np.maximum(0.0, (corner - points) @ out))
     if away[-1] < width:
         raise InputError(f"an edge beside the button stand is narrower than its {1e3 * width:.0f} mm")
-    image = part_between(mirrored(points, corner, out), 0.0, float(np.interp(width, away, arc_lengths(points))))
+    image = reflected(points, out, float(corner @ out))
+    image = part_between(image, 0.0, float(np.interp(width, away, arc_lengths(points))))
     # The stand is as wide everywhere.
     image[-1] += (width - (image[-1] - corner) @ out) * out
     return image
@@ -210,11 +204,10 @@ def _reflected(points: FloatArray, corner: FloatArray, out: FloatArray, width: f
 
 def bust_depth(piece: Piece, name: str) -> float | None:
     """Return how far from the upper end of an edge its piece's bust line meets it [m]; None where it does not."""
-    import shapely
+    return next(iter(_met_by(piece, downwards(piece, name)[0], "bust")), None)
 
-    edge = shapely.LineString(downwards(piece, name)[0])
-    for line in (line for key, line in piece.internal_lines.items() if key.startswith("bust")):
-        for end in line[[0, -1]]:
-            if edge.distance(shapely.Point(end)) < ON_EDGE:
-                return float(edge.project(shapely.Point(end)))
-    return None
+
+def _met_by(piece: Piece, edge: FloatArray, level: str) -> list[float]:
+    """Return how far along an edge lines of a level inside its piece end on it [m]."""
+    lines = {name: line for name, line in piece.internal_lines.items() if name.startswith(level)}
+    return [at for _, at in lines_ending_on(edge, lines)]

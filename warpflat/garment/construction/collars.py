@@ -17,7 +17,11 @@ from warpflat.garment.construction.edges import (
     bezier,
     copies_sewn,
     direction,
+    edge_at,
     free_piece_name,
+    joined,
+    lengths_of,
+    new_piece,
     sewn,
     with_pieces,
 )
@@ -148,7 +152,7 @@ def _convertible_edges(pattern: Pattern, chain: FreeChain, collar: Collar, size:
     back, grown = _rests_on(pattern, chain, size, (1.0 - 2.0 * _STANDS) * high)
     turn = 0.5 * length * max(0.0, grown - back) / (back * high)
     shape = Strip(length=length, height=high, turn=-turn, even=True, tip=collar.point + _STANDS * high, lean=_LEAN)
-    return strip_edges(*swept(shape), allowance=chain_allowance(pattern, chain, size))
+    return shape.edges(allowance=chain_allowance(pattern, chain, size))
 
 
 def _with_stand(pattern: Pattern, chain: FreeChain, collar: Collar) -> Pattern:
@@ -178,8 +182,8 @@ def _with_stand(pattern: Pattern, chain: FreeChain, collar: Collar) -> Pattern:
         begin, end = shapely.LineString(top).project(shapely.points(ends[::-1])).tolist()
         edge = part_between(top, begin, end)
         if beyond:
-            right = np.vstack([right, part_between(top, 0.0, begin)[1:]])
-            left = np.vstack([part_between(top, end, polyline_length(top))[:-1], left])
+            right = joined(right, part_between(top, 0.0, begin))
+            left = joined(part_between(top, end, polyline_length(top)), left)
         outline = {"lower": lower, "right end": right, "upper": edge, "left end": left}
         edges = [Edge(name=name, points=points, allowance=allowance) for name, points in outline.items()]
         made.append(_piece(pattern, stand, size, edges))
@@ -196,7 +200,7 @@ def _with_stand(pattern: Pattern, chain: FreeChain, collar: Collar) -> Pattern:
             length = drawn_length(edge)
             turn = 0.5 * length * max(0.0, grown - own) / (own * collar.fall)
             shape = Strip(length=length, height=collar.fall, turn=-turn, even=True, tip=collar.point, lean=_LEAN)
-            made.append(_piece(pattern, fall, size, strip_edges(*swept(shape), allowance=allowance)))
+            made.append(_piece(pattern, fall, size, shape.edges(allowance=allowance)))
     pattern = with_pieces(pattern, made)
     if collar.style != "shirt":
         return _sewn_on(pattern, chain, stand)
@@ -246,7 +250,7 @@ def with_hood(
             [(front, high), (front - 0.55 * wide, high), (back, 0.85 * high), (back, 0.55 * high),
              (back, 0.30 * high), (0.0, 0.12 * high), lower[0]]
         )  # fmt: skip
-        crown = np.vstack([bezier(*controls[:4], count=25), bezier(*controls[3:], count=25)[1:]])
+        crown = joined(bezier(*controls[:4], count=25), bezier(*controls[3:], count=25))
         allowance = chain_allowance(pattern, chain, size)
         hem = Edge(name="front edge", points=np.array([lower[-1], controls[0]]), kind="hem", allowance=_HOOD_HEM)
         edges = [
@@ -259,7 +263,7 @@ def with_hood(
             names = {"lower": "neck", "right end": "right side", "upper": "front edge", "left end": "left side"}
             edges = [
                 replace(hem, points=edge.points) if edge.name == "upper" else replace(edge, name=names[edge.name])
-                for edge in strip_edges(*swept(Strip(length=strip, height=drawn_length(crown))), allowance=allowance)
+                for edge in Strip(length=strip, height=drawn_length(crown)).edges(allowance=allowance)
             ]
             made.append(_piece(pattern, middle, size, edges, quantity=1, role="hood"))
     pattern = with_pieces(pattern, made)
@@ -288,7 +292,7 @@ def _parted_at(pattern: Pattern, places: Sequence[Place], line: str) -> tuple[Pa
     for name, edge in places:
         side = FreeChain(sides=(SeamSide(piece=name, edge=edge),), closed=False)
         at = {size: marks_of(pattern, side, size, line) for size in pattern.pieces}
-        lengths = {size: pattern.piece(name, size).edge(edge).length for size in pattern.pieces}
+        lengths = {size: edge_at(pattern, (name, edge), size).length for size in pattern.pieces}
         if any(len(row) != 1 or not OFF_END < row[0] < lengths[size] - OFF_END for size, row in at.items()):
             continue
         known = {each.name for each in pattern.piece(name, pattern.sample).edges}
@@ -308,7 +312,7 @@ def _rests_on(pattern: Pattern, chain: FreeChain, size: str, below: float) -> tu
     """Return the length of a neckline between the shoulders, behind, and that of the line at a distance below it on the pieces [m]."""
     import shapely
 
-    ends = np.cumsum([pattern.piece(side.piece, size).edge(side.edge).length for side in chain.sides]).tolist()
+    ends = np.cumsum(lengths_of(pattern, chain.sides, size)).tolist()
     sides = zip(ends, chain.sides, chain.sides[1:], strict=False)
     joints = [end for end, one, other in sides if one.piece != other.piece]
     reach = (joints[0], joints[-1]) if len(joints) > 1 else (0.25 * ends[-1], 0.75 * ends[-1])
@@ -332,10 +336,7 @@ def _piece(
     (x, low), (right, high) = outline.min(axis=0), outline.max(axis=0)
     grain = np.array([[0.5 * (x + right), share * high + (1.0 - share) * low] for share in (0.3, 0.7)])
     try:
-        return Piece(
-            name=name, size=size, fabric=pattern.pieces[size][0].fabric, quantity=quantity, edges=edges, paired=paired, role=role,
-            grain=grain,
-        )  # fmt: skip
+        return new_piece(name, pattern.pieces[size][0], edges, role, quantity=quantity, paired=paired, grain=grain)
     except InputError:
         raise InputError(f"no {_words(name)} of these measures can be drawn along this neckline") from None
 

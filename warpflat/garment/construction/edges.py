@@ -1,12 +1,12 @@
 """An algebra of edges, in which the parts that finish a garment are said.
 
-Lines are points, #P by 2 [m]: mirrored, rounded, parted. Pieces take the place of others, or are new, in
-every size at once. Seams get the first name that is free.
+Lines are points, #P by 2 [m]: joined, rounded, parted. Edges are changed, and pieces drawn beside others or in their place, in every
+size at once. Lines, marks, pieces and seams get the first name that is free.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -23,16 +23,24 @@ __all__ = [
     "backwards",
     "beside",
     "bezier",
+    "changed",
     "copies_sewn",
     "direction",
     "downwards",
+    "drawn_on",
+    "edge_at",
     "free_piece_name",
     "in_sizes",
+    "joined",
+    "lengths_of",
+    "lines_ending_on",
     "lines_inside",
-    "mirrored",
+    "lines_of",
     "neighbour",
+    "new_piece",
     "parted",
     "polygon_edges",
+    "redrawn",
     "runs_down",
     "sewn",
     "sewn_places",
@@ -58,9 +66,9 @@ def direction(points: FloatArray) -> FloatArray:
     return np.asarray((points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0]))
 
 
-def mirrored(points: FloatArray, at: FloatArray, out: FloatArray) -> FloatArray:
-    """Return the mirror image of points at the line through `at` whose unit normal is `out`."""
-    return np.asarray(points + 2.0 * np.outer((at - points) @ out, out))
+def joined(*lines: FloatArray) -> FloatArray:
+    """Return lines, of which each begins where the one before it ends, as one."""
+    return np.concatenate([lines[0], *(line[1:] for line in lines[1:])])
 
 
 def bezier(*controls: FloatArray, count: int) -> FloatArray:
@@ -85,6 +93,31 @@ def lines_inside(lines: Mapping[str, FloatArray], outline: FloatArray) -> dict[s
     return found
 
 
+def lines_of(piece: Piece) -> dict[str, FloatArray]:
+    """Return the edges of a piece and the lines inside it."""
+    return {**{edge.name: edge.points for edge in piece.edges}, **piece.internal_lines}
+
+
+def lines_ending_on(edge: FloatArray, lines: Mapping[str, FloatArray]) -> list[tuple[str, float]]:
+    """Return how far along an edge other lines end on it [m], within 1 mm, with their names."""
+    import shapely
+
+    line = shapely.LineString(edge)
+    ends = [(name, shapely.Point(end)) for name, points in lines.items() for end in points[[0, -1]]]
+    return [(name, float(line.project(end))) for name, end in ends if line.distance(end) < ON_EDGE]
+
+
+def drawn_on(
+    piece: Piece, lines: Iterable[tuple[str, FloatArray]], marks: Iterable[tuple[str, FloatArray]] = ()
+) -> Piece:
+    """Return a piece with more lines and marks, each of its name or the first one after it that is free."""
+    drawn, marked = dict(piece.internal_lines), dict(piece.marks)
+    for known, new in ((drawn, lines), (marked, marks)):
+        for name, points in new:
+            known[find_unused_name(name, known)] = points
+    return replace(piece, internal_lines=drawn, marks=marked)
+
+
 def up_and_across(piece: Piece) -> tuple[FloatArray, FloatArray]:
     """Return the unit vectors along the warp, upwards, and along the weft, to the right."""
     up = np.array([0.0, 1.0]) if piece.grain is None else direction(piece.grain)
@@ -103,9 +136,20 @@ def downwards(piece: Piece, name: str) -> tuple[FloatArray, bool]:
     return points[:: 1 if down else -1], down
 
 
+def edge_at(pattern: Pattern, at: SeamSide | Place, size: str | None = None) -> Edge:
+    """Return the edge at a place, or of a seam's side; of the sample size if none is given."""
+    name, edge = (at.piece, at.edge) if isinstance(at, SeamSide) else at
+    return pattern.piece(name, pattern.sample if size is None else size).edge(edge)
+
+
+def lengths_of(pattern: Pattern, sides: Iterable[SeamSide], size: str | None = None) -> list[float]:
+    """Return the lengths of edges [m], of the sample size if none is given."""
+    return [edge_at(pattern, side, size).length for side in sides]
+
+
 def side_points(pattern: Pattern, side: SeamSide, size: str) -> FloatArray:
     """Return the points of a seam's side, as the seam runs."""
-    return pattern.piece(side.piece, size).edge(side.edge).points[:: -1 if side.reversed else 1]
+    return edge_at(pattern, side, size).points[:: -1 if side.reversed else 1]
 
 
 def neighbour(piece: Piece, edge: str, end: int) -> tuple[str, int]:
@@ -171,6 +215,23 @@ def with_pieces(pattern: Pattern, pieces: Iterable[Piece]) -> Pattern:
     for piece in pieces:
         rows[piece.size][piece.name] = piece
     return replace(pattern, pieces={size: tuple(row.values()) for size, row in rows.items()})
+
+
+def redrawn(pattern: Pattern, name: str, draw: Callable[[Piece], Piece | Iterable[Piece]]) -> Pattern:
+    """Return a pattern with what `draw` makes of a piece in every size: others in its place, or new ones."""
+    made = [draw(piece) for piece in in_sizes(pattern, name)]
+    return with_pieces(pattern, (each for row in made for each in ((row,) if isinstance(row, Piece) else row)))
+
+
+def changed(pattern: Pattern, place: Place, change: Callable[[Piece, Edge], Sequence[Edge]]) -> Pattern:
+    """Return a pattern with what `change` makes of an edge of a piece, in every size."""
+    name, edge = place
+    return redrawn(pattern, name, lambda piece: with_edges(piece, {edge: change(piece, piece.edge(edge))}))
+
+
+def new_piece(name: str, like: Piece, edges: Sequence[Edge], role: str, **other: Any) -> Piece:
+    """Return a piece of the size and the cloth of another one; unless `other` says so, it is not cut in pairs."""
+    return Piece(name=name, size=like.size, edges=edges, role=role, **{"fabric": like.fabric, "paired": False, **other})
 
 
 def free_piece_name(pattern: Pattern, name: str) -> str:

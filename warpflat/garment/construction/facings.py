@@ -17,22 +17,23 @@ from warpflat.core import (
     FloatArray,
     InputError,
     arc_lengths,
-    find_unused_name,
     part_between,
     polyline_length,
+    reflected,
     without_side,
 )
 from warpflat.garment.construction.edges import (
     Place,
     beside,
     direction,
+    drawn_on,
     free_piece_name,
-    in_sizes,
-    mirrored,
+    joined,
+    new_piece,
+    redrawn,
     sewn,
     up_and_across,
     with_edges,
-    with_pieces,
 )
 from warpflat.pattern import Edge, Pattern, Piece, SeamSide
 
@@ -161,15 +162,15 @@ def _faced(
     sewn_in: bool = True,
 ) -> Pattern:
     """Return a pattern with the facing of a piece along some of its edges: folded along its button stand, or a piece of its own."""
-    made = []
-    for piece in in_sizes(pattern, name):
+
+    def faced(piece: Piece) -> Piece:
         around = piece.internal_lines.get("keyhole") if sewn_in else None
         strip = strip_along(piece, chain, width, around=around)
         if stand is not None and stand.grown_on:
-            made.append(_folded_over(piece, stand.edge, strip, sewn_in=sewn_in))
-        else:
-            made.append(strip_piece(piece, strip, title, "facing"))
-    return with_pieces(pattern, made)
+            return _folded_over(piece, stand.edge, strip, sewn_in=sewn_in)
+        return strip_piece(piece, strip, title, "facing")
+
+    return redrawn(pattern, name, faced)
 
 
 def centre_notch(piece: Piece) -> tuple[float, ...] | None:
@@ -216,7 +217,7 @@ def strip_along(piece: Piece, chain: Sequence[str], width: float, *, around: Flo
             raise InputError(f"the edges beside {where} are shorter than the facing is wide")
         ends.append(_start(line, width, edge))
     first, last = ends[0][::-1], ends[1]
-    line = np.concatenate([edge.points[int(k > 0) :] for k, edge in enumerate(edges)])
+    line = joined(*(edge.points for edge in edges))
     rounding = _ROUND if len(edges) > 1 else 0.0
     offset = shapely.LineString(line).offset_curve(width + rounding)
     inner = np.asarray((offset.offset_curve(-rounding) if rounding else offset).coords)[::-1]
@@ -227,7 +228,7 @@ def strip_along(piece: Piece, chain: Sequence[str], width: float, *, around: Flo
     inner = np.vstack([last[-1:], inner, first[:1]])
     if around is not None:
         # The inner edge of a facing that is made larger around a line.
-        outline = np.concatenate([line[:-1], last[:-1], inner[:-1], first[:-1]])
+        outline = joined(line, last, inner, first)[:-1]
         tongue = shapely.LineString(around).buffer(0.6 * width)
         # Rounded where the tongue leaves the strip.
         whole = shapely.union_all([shapely.Polygon(outline), tongue]).buffer(_ROUND).buffer(-_ROUND)
@@ -271,7 +272,7 @@ def strip_piece(piece: Piece, edges: Sequence[Edge], title: str, role: str, **ot
             "grain": middle + np.outer([-0.02, 0.02], up_and_across(piece)[0]),
             "internal_lines": {key: line for key, line in piece.internal_lines.items() if key.startswith("keyhole")},
         }  # fmt: skip
-        return Piece(name=title, size=piece.size, fabric=piece.fabric, edges=edges, role=role, **{**same, **other})
+        return new_piece(title, piece, edges, role, **{**same, **other})
     except InputError:
         raise InputError(f"no {role} can be drawn along {piece.name}.{edges[0].name}: make it narrower") from None
 
@@ -281,10 +282,11 @@ def _folded_over(piece: Piece, fold: str, edges: Sequence[Edge], *, sewn_in: boo
     at = [edge.name for edge in edges].index(fold)
     line = edges[at].points[[0, -1]]
     x, y = direction(line)
+    out = np.array([-y, x])
     images = [
         replace(
             edge, name=f"facing {edge.name}", kind=edge.kind if sewn_in or edge.kind != "seam" else "cut",
-            points=mirrored(edge.points[::-1], line[0], np.array([-y, x])), allowance=edge.width, vertices=None,
+            points=reflected(edge.points[::-1], out, float(line[0] @ out)), allowance=edge.width, vertices=None,
         )
         for edge in [*edges[:at][::-1], *edges[at + 1 :][::-1]]
     ]  # fmt: skip
@@ -292,5 +294,4 @@ def _folded_over(piece: Piece, fold: str, edges: Sequence[Edge], *, sewn_in: boo
     images[0].points[0], images[-1].points[-1] = line[0], line[1]
     for one, other in pairwise(images):
         other.points[0] = one.points[-1]
-    name = find_unused_name("fold line", piece.internal_lines)
-    return with_edges(piece, {fold: images}, internal_lines={**piece.internal_lines, name: line})
+    return drawn_on(with_edges(piece, {fold: images}), [("fold line", line)])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
@@ -13,11 +13,12 @@ from warpflat.garment.construction.button_stand import buttonhole
 from warpflat.garment.construction.collars import Collar, with_collar, with_hood
 from warpflat.garment.construction.edges import (
     Place,
+    changed,
     free_piece_name,
-    in_sizes,
+    lengths_of,
+    new_piece,
     sewn,
     sewn_places,
-    with_edges,
     with_pieces,
 )
 from warpflat.garment.construction.facings import Stand, centre_notch, is_beside, with_facings, with_stand_facings
@@ -25,7 +26,7 @@ from warpflat.garment.construction.flounces import with_flounce
 from warpflat.garment.construction.free_edges import Break, FreeChain, chain_allowance, chain_length, free_chains
 from warpflat.garment.construction.plackets import with_placket, with_slits
 from warpflat.garment.construction.shaped_band import shortened, slant_rises, with_shaped_waistband
-from warpflat.garment.construction.strips import CLOTH_WIDTH, NARROW, Strip, panel_count, strip_edges, swept
+from warpflat.garment.construction.strips import CLOTH_WIDTH, NARROW, Strip, panel_count
 from warpflat.pattern import Edge, Elastic, Pattern, Piece, SeamSide
 
 __all__ = ["FINISHES", "Finishing", "finish_edges", "hem_rises", "with_plackets"]
@@ -184,7 +185,9 @@ def _with_finish(
     if wish.kind == "casing":
         # Turned in, with an allowance of its width, and the edge turned in once more.
         wide = wish.width + NARROW
-        return _with_changed_edges(pattern, places, lambda piece, edge: replace(edge, kind="hem", allowance=wide))
+        for place in places:
+            pattern = changed(pattern, place, lambda _, edge: [replace(edge, kind="hem", allowance=wide)])
+        return pattern
     if wish.shaped:
         return with_shaped_waistband(pattern, places, wish.width, gaps=gaps)
     if wish.placket and wish.kind != "flounce":
@@ -235,24 +238,16 @@ def _opened_up(pattern: Pattern, called: str, *, sewn_there: bool = True) -> tup
     places = [place for place in free if names[place[1]] == called]
     if not places:
         raise InputError(f"no free edge {called!r}; {nearest(called, set(names.values()))}")
-    hems = [place for place in places if free[place] == "hem"]
-    if hems and sewn_there:
+
+    def opened(piece: Piece, edge: Edge) -> list[Edge]:
         # As wide as the allowance of the piece's other seams.
-        pattern = _with_changed_edges(
-            pattern, hems,
-            lambda piece, edge: replace(
-                edge, kind="seam", allowance=next((each.width for each in piece.edges if each.kind == "seam"), None)
-            ),
-        )  # fmt: skip
+        width = next((each.width for each in piece.edges if each.kind == "seam"), None)
+        return [replace(edge, kind="seam", allowance=width)]
+
+    for place in places:
+        if free[place] == "hem" and sewn_there:
+            pattern = changed(pattern, place, opened)
     return pattern, places
-
-
-def _with_changed_edges(pattern: Pattern, places: Sequence[Place], change: Callable[[Piece, Edge], Edge]) -> Pattern:
-    """Return a pattern with edges at some places as `change` returns them."""
-    for name, edge in places:
-        made = [with_edges(piece, {edge: [change(piece, piece.edge(edge))]}) for piece in in_sizes(pattern, name)]
-        pattern = with_pieces(pattern, made)
-    return pattern
 
 
 def _girth_at(size: str, levels: Sequence[str], girths: Mapping[str, Mapping[str, float]]) -> float:
@@ -327,7 +322,7 @@ def _centres(pattern: Pattern, chain: FreeChain) -> tuple[float, ...]:
 
     A piece that is printed half has the notch on its fold, and the strip has one for it.
     """
-    lengths = [pattern.piece(side.piece, pattern.sample).edge(side.edge).length for side in chain.sides]
+    lengths = lengths_of(pattern, chain.sides)
     ends = np.cumsum(lengths)
     whole = [centre_notch(pattern.piece(side.piece, pattern.sample)) is not None for side in chain.sides]
     return tuple(
@@ -346,8 +341,8 @@ def _strip(
     # What is turned in has an allowance too, and no seam; a binding's other edge is folded over as it is cut.
     ends = "seam" if joined else "cut"
     upper = {"binding": ("cut", 0.0), "ruffle": ("hem", NARROW)}.get(wish.kind, ("cut", allowance))
-    edges = strip_edges(
-        *swept(Strip(length=length, height=high)), overlap=wish.overlap,
+    edges = Strip(length=length, height=high).edges(
+        overlap=wish.overlap,
         kinds={"overlap": "cut", "upper": upper[0], "right end": ends, "left end": ends},
         allowance={**dict.fromkeys(("lower", "right end", "left end", "overlap"), allowance), "upper": upper[1]},
     )  # fmt: skip
@@ -366,7 +361,5 @@ def _strip(
         # It buttons upon itself, in the middle of its outer half.
         marks["button"] = np.array([length + 0.5 * wish.overlap, 0.5 * wish.width])
         lines |= buttonhole(np.array([0.5 * wish.overlap, 0.5 * wish.width]), np.array([1.0, 0.0]))
-    return Piece(
-        name=name, size=like.size, fabric=like.fabric, quantity=quantity, edges=edges, internal_lines=lines,
-        grain=middle + np.outer([-reach, reach], along), paired=False, role=role, marks=marks,
-    )  # fmt: skip
+    grain = middle + np.outer([-reach, reach], along)
+    return new_piece(name, like, edges, role, quantity=quantity, internal_lines=lines, grain=grain, marks=marks)

@@ -12,9 +12,9 @@ from warpflat.core import FloatArray, InputError
 from warpflat.garment.construction.edges import (
     beside,
     free_piece_name,
-    in_sizes,
+    new_piece,
+    redrawn,
     sewn,
-    with_pieces,
 )
 from warpflat.garment.construction.facings import centre_notch
 from warpflat.garment.construction.free_edges import FreeChain, chain_allowance, chain_length
@@ -149,12 +149,11 @@ def _with_panel(
             for as_named, kind, allowance in [named[edge.name]]
         ]
         middle_line = -0.5 * (lower[len(lower) // 2] + upper[len(upper) // 2])
-        return Piece(
-                name=title, size=size, fabric=piece.fabric, quantity=piece.quantity * count, edges=edges, paired=piece.paired,
-                grain=middle_line + np.outer([-0.3 * width, 0.3 * width], [0.0, 1.0]),
-            )  # fmt: skip
+        grain = middle_line + np.outer([-0.3 * width, 0.3 * width], [0.0, 1.0])
+        quantity = piece.quantity * count
+        return new_piece(title, piece, edges, "shell", quantity=quantity, paired=piece.paired, grain=grain)
 
-    pattern = with_pieces(pattern, map(draw, in_sizes(pattern, name)))
+    pattern = redrawn(pattern, name, draw)
     pattern = sewn(
         pattern,
         title.replace("_", " "),

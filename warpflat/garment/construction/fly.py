@@ -12,9 +12,9 @@ from warpflat.garment.construction.edges import (
     ON,
     downwards,
     free_piece_name,
-    in_sizes,
     neighbour,
-    with_pieces,
+    new_piece,
+    redrawn,
 )
 from warpflat.garment.construction.strips import folded_strip
 from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
@@ -64,8 +64,7 @@ def _with_fly(pattern: Pattern, seam: Seam, length: float, band: str) -> Pattern
 
     side, (facing, shield) = seam.sides[1][0], (free_piece_name(pattern, name) for name in ("fly_facing", "fly_shield"))
 
-    made = list[Piece]()
-    for piece in in_sizes(pattern, side.piece):
+    def fly(piece: Piece) -> tuple[Piece, Piece]:
         points = downwards(piece, side.edge)[0]
         centre, waist = shapely.LineString(points), shapely.LineString(piece.edge(_above(piece, side.edge)).points)
         # As far as the facing's lower end turns to the edge in a quarter of a circle.
@@ -86,16 +85,9 @@ def _with_fly(pattern: Pattern, seam: Seam, length: float, band: str) -> Pattern
             for a, b in pairwise(ends)
         ]
         wide = next((edge.length for edge in pattern.piece(band, piece.size).edges if edge.name == "overlap"), _WIDE)
-        made += [
-            Piece(
-                name=facing,
-                size=piece.size,
-                fabric=piece.fabric,
-                edges=edges,
-                role="fly",
-                paired=False,
-                grain=piece.grain,
-            ),
+        return (
+            new_piece(facing, piece, edges, "fly", grain=piece.grain),
             folded_strip(shield, piece, length, wide, role="fly", grain=(0.2, 0.5)),
-        ]
-    return with_pieces(pattern, made)
+        )
+
+    return redrawn(pattern, side.piece, fly)

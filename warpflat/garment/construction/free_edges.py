@@ -9,16 +9,16 @@ import numpy as np
 
 from warpflat.core import FloatArray, find_unused_name, other_side, points_at_lengths, polyline_length, without_side
 from warpflat.garment.construction.edges import (
-    ON_EDGE,
     Place,
+    changed,
     direction,
-    in_sizes,
+    edge_at,
+    lines_ending_on,
+    lines_of,
     neighbour,
     parted,
     runs_down,
     side_points,
-    with_edges,
-    with_pieces,
 )
 from warpflat.pattern import Pattern, Seam, SeamSide, drawn_length
 
@@ -127,13 +127,12 @@ def free_chains(
 
 def chain_length(pattern: Pattern, chain: FreeChain, size: str | None = None) -> float:
     """Return the length of a chain in a size, or in the sample size, along the curves as which its edges are drawn [m]."""
-    size = pattern.sample if size is None else size
-    return sum(drawn_length(pattern.piece(side.piece, size).edge(side.edge).points) for side in chain.sides)
+    return sum(drawn_length(edge_at(pattern, side, size).points) for side in chain.sides)
 
 
 def chain_allowance(pattern: Pattern, chain: FreeChain, size: str) -> float:
     """Return the allowance of a chain's first edge [m], which what is sewn to the chain has too."""
-    return pattern.piece(chain.sides[0].piece, size).edge(chain.sides[0].edge).width
+    return edge_at(pattern, chain.sides[0], size).width
 
 
 def _other_end(corner: _Corner) -> _Corner:
@@ -209,26 +208,19 @@ def split_edge(pattern: Pattern, place: Place, at: Mapping[str, float]) -> tuple
     sample = pattern.piece(name, pattern.sample)
     new = find_unused_name(edge, {each.name for each in sample.edges})
     names = (edge, new) if at[pattern.sample] > 0.5 * sample.edge(edge).length else (new, edge)
-    made = [
-        with_edges(piece, {edge: parted(piece.edge(edge), at[piece.size], names)}) for piece in in_sizes(pattern, name)
-    ]
-    return with_pieces(pattern, made), (name, names[0], 1)
+    made = changed(pattern, place, lambda piece, whole: parted(whole, at[piece.size], names))
+    return made, (name, names[0], 1)
 
 
 def marks_of(pattern: Pattern, chain: FreeChain, size: str, line: str) -> list[float]:
     """Return where along a chain a line of its pieces, inside or on their border, meets it [m]."""
-    import shapely
-
     found, before = list[float](), 0.0
     for side in chain.sides:
-        piece = pattern.piece(side.piece, size)
+        known = lines_of(pattern.piece(side.piece, size)).items()
+        lines = {name: each for name, each in known if name.rstrip(" 0123456789") == line and name != side.edge}
         points = side_points(pattern, side, size)
-        drawn = shapely.LineString(points)
-        known = {**piece.internal_lines, **{each.name: each.points for each in piece.edges if each.name != side.edge}}
-        lines = [each for name, each in known.items() if name.rstrip(" 0123456789") == line]
-        for end in (shapely.Point(each[k]) for each in lines for k in (0, -1)):
-            at = before + float(drawn.project(end))
-            if drawn.distance(end) < ON_EDGE and all(abs(at - other) > OFF_END for other in found):
+        for at in (before + at for _, at in lines_ending_on(points, lines)):
+            if all(abs(at - other) > OFF_END for other in found):
                 found.append(at)
         before += polyline_length(points)
     return sorted(found)

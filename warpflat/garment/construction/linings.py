@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpflat.core import InputError
-from warpflat.garment.construction.edges import free_piece_name, in_sizes, sewn, with_pieces
+from warpflat.garment.construction.edges import free_piece_name, in_sizes, new_piece, sewn, with_pieces
 from warpflat.garment.construction.facings import INNER, centre_notch
 from warpflat.garment.construction.shaped_band import without_strip
 from warpflat.pattern import Edge, Pattern, Piece, SeamSide
@@ -30,13 +30,9 @@ def add_interfacing(pattern: Pattern, cloth: str) -> Pattern:
         if _has_grown_facing(piece):
             facing = [edge for edge in piece.edges if edge.name.startswith("facing ")]
             fold = Edge(name="fold line", points=np.array([facing[-1].points[-1], facing[0].points[0]]))
-            made.append(
-                Piece(
-                    name=f"{piece.name}_facing_interfacing", size=piece.size, fabric=cloth, quantity=piece.quantity, paired=piece.paired,
-                    edges=[replace(edge, kind="cut", allowance=0.0, vertices=None) for edge in (*facing, fold)],
-                    role="interfacing",
-                )
-            )  # fmt: skip
+            edges = [replace(edge, kind="cut", allowance=0.0, vertices=None) for edge in (*facing, fold)]
+            same = {"fabric": cloth, "quantity": piece.quantity, "paired": piece.paired}
+            made.append(new_piece(f"{piece.name}_facing_interfacing", piece, edges, "interfacing", **same))
     return with_pieces(pattern, made)
 
 

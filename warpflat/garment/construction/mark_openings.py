@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -11,16 +12,22 @@ from warpflat.core import FloatArray, InputError, find_unused_name, part_between
 from warpflat.garment.construction.button_stand import bust_depth, button_depths, with_button_stand, with_wrap
 from warpflat.garment.construction.edges import (
     ON,
+    changed,
     direction,
     downwards,
+    drawn_on,
+    edge_at,
     in_sizes,
+    lengths_of,
     lines_inside,
+    lines_of,
     neighbour,
+    new_piece,
     parted,
+    redrawn,
     runs_down,
     sewn,
     sewn_places,
-    with_edges,
     with_pieces,
 )
 from warpflat.garment.construction.openings import Opening, OpeningPart
@@ -74,7 +81,7 @@ def mark_openings(pattern: Pattern, openings: Sequence[Opening], placed: Placed)
 def _with_opening(pattern: Pattern, opening: Opening, part: OpeningPart, parts: _Parts) -> Pattern:
     """Return a pattern with what an opening does to one of its seams, or to the piece across which it lies."""
     if opening.kind == "keyhole":
-        return with_pieces(pattern, [_keyhole(piece, opening) for piece in in_sizes(pattern, part.piece)])
+        return redrawn(pattern, part.piece, lambda piece: _keyhole(piece, opening))
     seam = next((each for each in pattern.seams if each.name == part.seam), None)
     if seam is None:
         raise InputError(f"the pattern has no seam {part.seam!r} of its own")
@@ -107,8 +114,7 @@ def _with_opening(pattern: Pattern, opening: Opening, part: OpeningPart, parts: 
                     f"a {opening.kind} of {1e3 * opening.length:.0f} mm leaves nothing of the seam {seam.name!r}, "
                     f"{1e3 * whole:.0f} mm long; make it shorter, or leave the seam out of the form"
                 )
-        made = [_with_free_end(piece, side.edge, opening) for piece in in_sizes(pattern, side.piece)]
-        pattern = with_pieces(pattern, made)
+        pattern = changed(pattern, (side.piece, side.edge), lambda piece, edge: _free_end(piece, edge, opening))
     return _with_godet(pattern, seam, opening) if opening.kind == "godet" else pattern
 
 
@@ -136,17 +142,17 @@ def _with_zip(pattern: Pattern, seam: Seam, opening: Opening, parts: _Parts, *, 
     """Return a pattern with the line of a zip beside the edges of a seam, and a notch where it ends, if it does within the seam."""
     import shapely
 
-    def beside_edge(piece: Piece, edge: str) -> Piece:
-        row = parts[piece.size]
-        begin, stop = _reach(opening, _part_of(row, seam))
-        line = np.asarray(shapely.LineString(piece.edge(edge).points).offset_curve(_INSIDE).coords)
-        line = line if runs_down(piece, line) else line[::-1]
-        title = find_unused_name(replace(opening, length=_length(opening, row)).title, piece.internal_lines)
-        drawn = part_between(line, begin, min(stop, polyline_length(line)))
-        return replace(piece, internal_lines={**piece.internal_lines, title: drawn})
-
     for side in [side for row in seam.sides for side in row if not side.mirrored]:
-        pattern = with_pieces(pattern, [beside_edge(piece, side.edge) for piece in in_sizes(pattern, side.piece)])
+
+        def beside_edge(piece: Piece, edge: str = side.edge) -> Piece:
+            row = parts[piece.size]
+            begin, stop = _reach(opening, _part_of(row, seam))
+            line = np.asarray(shapely.LineString(piece.edge(edge).points).offset_curve(_INSIDE).coords)
+            line = line if runs_down(piece, line) else line[::-1]
+            title = replace(opening, length=_length(opening, row)).title
+            return drawn_on(piece, [(title, part_between(line, begin, min(stop, polyline_length(line))))])
+
+        pattern = redrawn(pattern, side.piece, beside_edge)
     if not ends:
         return pattern
     return with_notches(pattern, seam, {size: [_reach(opening, _part_of(row, seam))[1]] for size, row in parts.items()})
@@ -163,7 +169,7 @@ def with_notches(pattern: Pattern, seam: Seam, lengths: Mapping[str, Sequence[fl
     row, by_size = seam.sides[0], dict[str, tuple[float, ...]]()
     down = downwards(pattern.piece(row[0].piece, pattern.sample), row[0].edge)[1]
     for size, at in lengths.items():
-        whole = sum(pattern.piece(side.piece, size).edge(side.edge).length for side in row)
+        whole = sum(lengths_of(pattern, row, size))
         shares = np.asarray(at) / whole if down != row[0].reversed else 1.0 - np.asarray(at) / whole
         count, given = max(1, round(whole / _SPACING)), seam.of_size(size).notches
         spaced = given if given is not None else [(k + 0.42) / count for k in range(count)]
@@ -196,7 +202,7 @@ def _with_buttons(pattern: Pattern, seam: Seam, opening: Opening, parts: _Parts)
         end = np.inf if opening.length >= whole else opening.length - part.before
         return with_button_stand(piece, edge, opening, end, here)
 
-    still_sewn = opening.length < pattern.piece(name, pattern.sample).edge(edge).length
+    still_sewn = opening.length < edge_at(pattern, places[0]).length
     pattern = replace(pattern, seams=[each for each in pattern.seams if each.name != seam.name or still_sewn])
     return with_pieces(pattern, [buttoned(piece, edge) for name, edge in places for piece in in_sizes(pattern, name)])
 
@@ -227,11 +233,9 @@ def _with_godet(pattern: Pattern, seam: Seam, opening: Opening) -> Pattern:
             Edge(name="right", points=np.vstack([arc[-1:], apex]), allowance=side.allowance),
         ]
         grain = np.array([[0.0, -0.8 * opening.length], [0.0, -0.3 * opening.length]])
-        return Piece(
-            name=name, size=piece.size, fabric=shell.fabric, quantity=both, paired=False, edges=edges, grain=grain
-        )
+        return new_piece(name, piece, edges, "shell", quantity=both, grain=grain)
 
-    pattern = with_pieces(pattern, map(wedge, in_sizes(pattern, first.piece)))
+    pattern = redrawn(pattern, first.piece, wedge)
     for (side,) in seam.sides:
         free = f"{side.edge} godet"
         down = downwards(pattern.piece(side.piece, pattern.sample), free)[1]
@@ -258,8 +262,7 @@ def _with_wrap(pattern: Pattern, seam: Seam, opening: Opening) -> Pattern:
 def _keyhole(piece: Piece, opening: Opening) -> Piece:
     import shapely
 
-    folds = {edge.name: edge.points for edge in piece.edges}
-    line = piece.internal_lines.get(opening.line, folds.get(opening.line))
+    line = lines_of(piece).get(opening.line)
     if line is None:
         raise InputError(f"a keyhole is cut along a line inside its piece; {piece.name} has no {opening.line!r} inside")
     slit = part_between(line if runs_down(piece, line) else line[::-1], 0.0, opening.length)
@@ -273,20 +276,17 @@ def _keyhole(piece: Piece, opening: Opening) -> Piece:
     for number, (sign, end) in enumerate(((-1.0, ring[0]), (1.0, ring[-1]))):
         shapes[f"keyhole side {number + 1}"] = np.array([slit[0] + sign * half * across, end])
     body = shapely.Polygon(piece.outline).buffer(ON)
-    lines = {**piece.internal_lines, **lines_inside(shapes, piece.outline)}
     button = slit[0] + 0.010 * along + (half + 0.008) * across
-    marks = {**piece.marks, "button": button} if body.contains(shapely.Point(button)) else dict(piece.marks)
-    return replace(piece, internal_lines=lines, marks=marks)
+    marks = [("button", button)] if body.contains(shapely.Point(button)) else []
+    return drawn_on(piece, lines_inside(shapes, piece.outline).items(), marks)
 
 
-def _with_free_end(piece: Piece, name: str, opening: Opening) -> Piece:
-    """Return a piece one of whose edges has its lower end as an edge of its own."""
-    edge, (_, down) = piece.edge(name), downwards(piece, name)
-    free = find_unused_name(f"{name} {opening.kind}", {each.name for each in piece.edges})
-    if down:
-        above, below = parted(edge, edge.length - opening.length, (name, free))
-    else:
-        below, above = parted(edge, opening.length, (free, name))
-    if opening.kind != "godet":
-        below = replace(below, kind="hem", allowance=opening.width)
-    return with_edges(piece, {name: (above, below) if down else (below, above)})
+def _free_end(piece: Piece, edge: Edge, opening: Opening) -> Sequence[Edge]:
+    """Return an edge of a piece with its lower end as an edge of its own."""
+    free = find_unused_name(f"{edge.name} {opening.kind}", {each.name for each in piece.edges})
+    how: dict[str, Any] = {} if opening.kind == "godet" else {"kind": "hem", "allowance": opening.width}
+    if runs_down(piece, edge.points):
+        above, below = parted(edge, edge.length - opening.length, (edge.name, free))
+        return above, replace(below, **how)
+    below, above = parted(edge, opening.length, (free, edge.name))
+    return replace(below, **how), above

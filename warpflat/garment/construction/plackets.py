@@ -14,8 +14,11 @@ from warpflat.garment.construction.edges import (
     ON_EDGE,
     Place,
     direction,
+    drawn_on,
+    edge_at,
     free_piece_name,
-    in_sizes,
+    lengths_of,
+    redrawn,
     side_points,
     up_and_across,
     with_pieces,
@@ -54,48 +57,31 @@ def with_slits(pattern: Pattern, places: Sequence[Place], length: float, called:
     """
     import shapely
 
-    breaks, title = [], f"slit {1e3 * length:.0f} mm"
-    for name, edge in places:
-        at, lines = {}, {}
-        share = 0.5 + 0.5 * _BEHIND * _towards_back(pattern, name, edge)
-        for size in pattern.pieces:
-            piece = pattern.piece(name, size)
-            points = piece.edge(edge).points
-            at[size] = piece.edge(edge).length * share
-            start, (x, y) = (
-                points_at_lengths(points, at[size]),
-                direction(points_at_lengths(points, [at[size] - 1e-3, at[size] + 1e-3])),
-            )
-            lines[size] = np.array([start, start + length * np.array([-y, x])])
-            if not shapely.Polygon(piece.outline).buffer(ON).contains(shapely.LineString(lines[size])):
-                raise InputError(f"a slit of {1e3 * length:.0f} mm from {name}.{edge} does not lie within the piece")
-        pattern, broken = split_edge(pattern, (name, edge), at)
+    breaks = []
+    for place in places:
+        share = 0.5 + 0.5 * _BEHIND * _towards_back(pattern, *place)
+        at = {size: share * edge_at(pattern, place, size).length for size in pattern.pieces}
+
+        def slit(piece: Piece, edge: str = place[1], at: Mapping[str, float] = at) -> Piece:
+            near = at[piece.size] + np.array([-1e-3, 0.0, 1e-3])
+            before, start, after = points_at_lengths(piece.edge(edge).points, near)
+            x, y = direction(np.array([before, after]))
+            line = np.array([start, start + length * np.array([-y, x])])
+            if not shapely.Polygon(piece.outline).buffer(ON).contains(shapely.LineString(line)):
+                words = f"a slit of {1e3 * length:.0f} mm from {piece.name}.{edge}"
+                raise InputError(f"{words} does not lie within the piece")
+            return drawn_on(piece, [(f"slit {1e3 * length:.0f} mm", line)])
+
+        pattern, broken = split_edge(redrawn(pattern, place[0], slit), place, at)
         breaks.append(broken)
-        made = [_with_lines(piece, {title: lines[piece.size]}) for piece in in_sizes(pattern, name)]
-        pattern = with_pieces(pattern, made)
     count = sum(pattern.piece(name, pattern.sample).quantity for name, _ in places)
     title = free_piece_name(pattern, f"{called}_placket")
     turned_in = {"lower": _TURNED_IN, "upper": _TURNED_IN}
     like = pattern.pieces[pattern.sample][0]
     binding = folded_strip(
-        title,
-        like,
-        2.0 * length + _LONGER,
-        _BINDING,
-        role="placket",
-        quantity=count,
-        allowance=turned_in,
-        grain=(0.1, 1.0),
-    )
+        title, like, 2.0 * length + _LONGER, _BINDING, role="placket", quantity=count, allowance=turned_in, grain=(0.1, 1.0)
+    )  # fmt: skip
     return with_pieces(pattern, [replace(binding, size=size) for size in pattern.pieces]), breaks
-
-
-def _with_lines(piece: Piece, lines: Mapping[str, FloatArray]) -> Piece:
-    """Return a piece with more lines, of the first names that are free."""
-    drawn = dict(piece.internal_lines)
-    for title, line in lines.items():
-        drawn[find_unused_name(title, drawn)] = line
-    return replace(piece, internal_lines=drawn)
 
 
 def with_placket(pattern: Pattern, places: Sequence[Place], length: float, called: str) -> tuple[Pattern, list[Break]]:
@@ -118,7 +104,7 @@ def with_placket(pattern: Pattern, places: Sequence[Place], length: float, calle
         name, edge = place
         chain = free_chain(pattern, [place])
         at = {size: marks_of(pattern, chain, size, "centre front") for size in pattern.pieces}
-        lengths = {size: pattern.piece(name, size).edge(edge).length for size in pattern.pieces}
+        lengths = {size: edge_at(pattern, place, size).length for size in pattern.pieces}
         if all(len(row) == 1 and ON_EDGE < row[0] < lengths[size] - ON_EDGE for size, row in at.items()):
             break
     else:
@@ -138,7 +124,7 @@ def with_placket(pattern: Pattern, places: Sequence[Place], length: float, calle
         if not body.buffer(0.02).contains(shapely.MultiLineString(list(lines.values()))):
             raise InputError(f"a placket of {1e3 * length:.0f} mm does not lie within {name!r}")
         inside = {title: shapely.LineString(line).intersection(body.buffer(ON)) for title, line in lines.items()}
-        return _with_lines(piece, {title: np.asarray(line.coords) for title, line in inside.items()})
+        return drawn_on(piece, [(title, np.asarray(line.coords)) for title, line in inside.items()])
 
     marks, holes = dict[str, FloatArray](), dict[str, FloatArray]()
     # The upper end lies on the left. Both strips are marked: one gets the buttons, the other one the buttonholes.
@@ -148,14 +134,13 @@ def with_placket(pattern: Pattern, places: Sequence[Place], length: float, calle
         for title, line in buttonhole(place_of_button, np.array([1.0, 0.0])).items():
             holes[f"{title} of {number + 1}"] = line
     title = free_piece_name(pattern, f"{called}_placket")
-    pattern = with_pieces(pattern, map(boxed, in_sizes(pattern, name)))
-    strips = [
-        folded_strip(
+
+    def boxed_and_filled(piece: Piece) -> tuple[Piece, Piece]:
+        return boxed(piece), folded_strip(
             title, piece, length + _LONGER, _STRIP, role="placket", quantity=2, grain=(0.1, 1.0), marks=marks, internal_lines=holes
-        )
-        for piece in in_sizes(pattern, name)
-    ]  # fmt: skip
-    pattern = with_pieces(pattern, strips)
+        )  # fmt: skip
+
+    pattern = redrawn(pattern, name, boxed_and_filled)
     pattern, broken = split_edge(pattern, place, {size: row[0] for size, row in at.items()})
     return pattern, [broken]
 
@@ -172,7 +157,7 @@ def _towards_back(pattern: Pattern, name: str, edge: str) -> float:
                 continue
             run = np.concatenate([side_points(pattern, side, pattern.sample) for side in own])
             # What of the other side is a front or a back, and the place opposite to its middle.
-            parts = [pattern.piece(side.piece, pattern.sample).edge(side.edge).length for side in other]
+            parts = lengths_of(pattern, other)
             middles = (np.cumsum(parts) - 0.5 * np.array(parts)) / sum(parts)
             for side, share in zip(other, middles, strict=True):
                 for face in set(side.piece.split("_")) & set(found):

@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -25,17 +24,21 @@ from warpflat.garment.construction.edges import (
     beside,
     copies_sewn,
     downwards,
+    drawn_on,
     free_piece_name,
     in_sizes,
+    joined,
+    lines_of,
+    new_piece,
     polygon_edges,
+    redrawn,
     sewn,
     trimmed,
     up_and_across,
     with_edges,
-    with_pieces,
 )
 from warpflat.garment.construction.mark_openings import with_notches
-from warpflat.garment.construction.strips import NARROW, Strip, folded_strip, strip_edges, swept
+from warpflat.garment.construction.strips import NARROW, Strip, folded_strip
 from warpflat.pattern import Edge, Pattern, Piece, SeamSide
 
 __all__ = ["Pocket", "add_pockets"]
@@ -99,57 +102,35 @@ def add_pockets(pattern: Pattern, pockets: Sequence[Pocket]) -> Pattern:
 
 def _with_placed(pattern: Pattern, pocket: Pocket) -> Pattern:
     """Return a pattern with a patch or welt pocket and its place, on both sides of a piece that has both."""
-    # By size what is made smaller for a short line, and how many the garment has.
-    fitted, counts = dict[str, Pocket](), dict[str, int]()
-    for size in pattern.pieces:
-        like = pattern.piece(pocket.where, size)
-        line = _line_of(like, pocket.line)
-        smaller = min(1.0, pocket.most_share * polyline_length(line) / pocket.width)
-        keys = ("width", "height", "below", "from_centre")
-        fitted[size] = replace(pocket, **{key: smaller * getattr(pocket, key) for key in keys})
-
-    def placed(piece: Piece) -> Piece:
-        places = _places(piece, fitted[piece.size])
-        counts[piece.size] = len(places) * piece.quantity * (2 if piece.on_fold else 1)
-        lines, marks = dict(piece.internal_lines), dict(piece.marks)
-        for place in places:
-            # Side by side, so that its corners stay sharp; the upper edge of a patch is left open.
-            for ends in pairwise([*place[1:], place[0]] if pocket.kind == "patch" else [*place, place[0]]):
-                lines[find_unused_name("pocket", lines)] = np.array(ends)
-            for corner in place[:2]:
-                marks[find_unused_name("pocket corner", marks)] = corner
-        return replace(piece, internal_lines=lines, marks=marks)
-
-    pattern = with_pieces(pattern, map(placed, in_sizes(pattern, pocket.where)))
     patch, welt, bag = (
         free_piece_name(pattern, f"{pocket.where}_{what}") for what in ("pocket", "pocket_welt", "pocket_bag")
     )
 
-    made = list[Piece]()
-    for like in in_sizes(pattern, pocket.where):
-        here, count = fitted[like.size], counts[like.size]
+    def placed(piece: Piece) -> tuple[Piece, ...]:
+        # Smaller where its line is short.
+        smaller = min(1.0, pocket.most_share * polyline_length(_line_of(piece, pocket.line)) / pocket.width)
+        keys = ("width", "height", "below", "from_centre")
+        here = replace(pocket, **{key: smaller * getattr(pocket, key) for key in keys})
+        places = _places(piece, here)
+        count = len(places) * piece.quantity * (2 if piece.on_fold else 1)
+        # Side by side, so that its corners stay sharp; the upper edge of a patch is left open.
+        rows = [[*place[1:], place[0]] if pocket.kind == "patch" else [*place, place[0]] for place in places]
+        sides = [("pocket", np.array(ends)) for row in rows for ends in pairwise(row)]
+        marked = drawn_on(piece, sides, [("pocket corner", corner) for place in places for corner in place[:2]])
         if pocket.kind == "patch":
             names = ("upper", "left side", "lower left", "lower right", "right side")
             edges = polygon_edges(names, _shape(here), kind="cut", allowance=NARROW)
             edges = [replace(edges[0], kind="hem", allowance=_HEM), *edges[1:]]
-            made.append(_pocket_piece(patch, like, edges, count))
-        else:
-            long = here.width + 2 * _WELT_ENDS
-            bag_edges = strip_edges(
-                *swept(Strip(length=here.width + 2 * _BESIDE, height=here.height)), kinds="cut", allowance=NARROW
-            )
-            made += [
-                folded_strip(welt, like, long, here.welt, role="pocket", quantity=count),
-                _pocket_piece(bag, like, bag_edges, 2 * count),
-            ]
-    return with_pieces(pattern, made)
+            return marked, new_piece(patch, piece, edges, "pocket", quantity=count)
+        long = here.width + 2 * _WELT_ENDS
+        around = Strip(length=here.width + 2 * _BESIDE, height=here.height).edges(kinds="cut", allowance=NARROW)
+        return (
+            marked,
+            folded_strip(welt, piece, long, here.welt, role="pocket", quantity=count),
+            new_piece(bag, piece, around, "pocket", quantity=2 * count),
+        )
 
-
-def _pocket_piece(name: str, like: Piece, edges: Sequence[Edge], quantity: int, **other: Any) -> Piece:
-    return Piece(
-        name=name, size=like.size, fabric=like.fabric, quantity=quantity, edges=edges, role="pocket",
-        **{"paired": False, **other},
-    )  # fmt: skip
+    return redrawn(pattern, pocket.where, placed)
 
 
 def _line_of(piece: Piece, name: str) -> FloatArray:
@@ -158,7 +139,7 @@ def _line_of(piece: Piece, name: str) -> FloatArray:
     Raises:
         InputError: it has none; gives the nearest.
     """
-    known = {**{edge.name: edge.points for edge in piece.edges}, **piece.internal_lines}
+    known = lines_of(piece)
     if name not in known:
         raise InputError(f"piece {piece.name!r} has no line {name!r}; {nearest(name, known)}")
     return known[name]
@@ -206,7 +187,7 @@ def _middles(piece: Piece, pocket: Pocket, across: FloatArray, level: float) -> 
     """
     import shapely
 
-    known = {**{edge.name: edge.points for edge in piece.edges}, **piece.internal_lines}
+    known = lines_of(piece)
     centre = next((points for name, points in known.items() if name.startswith("centre")), None)
     if centre is not None:
         at, away = float((centre @ across).mean()), pocket.from_centre + 0.5 * pocket.width
@@ -249,10 +230,10 @@ def _cut_hip_pocket(pattern: Pattern, pocket: Pocket, front: SeamSide) -> Patter
     # The upper edge comes before the side's where that runs downwards.
     first = downwards(sample, front.edge)[1]
     upper = beside(sample, front.edge)[0 if first else 1]
-    made = list[Piece]()
-    for piece in in_sizes(pattern, front.piece):
-        made += _hip_pocket(piece, pocket, upper, front.edge, (opening, facing, bag), first=first)
-    pattern = with_pieces(pattern, made)
+    names = opening, facing, bag
+    pattern = redrawn(
+        pattern, front.piece, lambda piece: _hip_pocket(piece, pocket, upper, front.edge, names, first=first)
+    )
 
     def both(side: SeamSide) -> list[SeamSide]:
         if side.piece != front.piece or side.edge not in (upper, front.edge):
@@ -317,8 +298,7 @@ def _hip_pocket(
     straight = Edge(name=opening, points=np.array([parts[upper][0][-1], parts[side][0][-1]]))
 
     def part(name: str, *lines: FloatArray) -> Edge:
-        joined = np.vstack([*(line[:-1] for line in lines[:-1]), lines[-1]])
-        return replace(piece.edge(name), points=joined[:: -1 if name == upper else 1], vertices=None)
+        return replace(piece.edge(name), points=joined(*lines)[:: -1 if name == upper else 1], vertices=None)
 
     def under(name: str) -> Edge:
         return replace(part(name, parts[name][1]), name=f"{name} under", kind="cut", allowance=NARROW)
@@ -339,8 +319,8 @@ def _hip_pocket(
     }  # fmt: skip
     return (
         trimmed(panel, panel.edges),
-        _pocket_piece(facing, piece, of_facing, **like),
-        _pocket_piece(bag, piece, of_bag, **like),
+        new_piece(facing, piece, of_facing, "pocket", **like),
+        new_piece(bag, piece, of_bag, "pocket", **like),
     )
 
 
@@ -352,7 +332,7 @@ def _between_ends(ring: FloatArray, start: FloatArray, end: FloatArray, away: Fl
     forward, there = (places[1:] - places[0]) % whole
     if there < forward:
         return _between_ends(ring[::-1], start, end, away)
-    part = part_between(np.vstack([ring[:-1], ring]), places[0], places[0] + forward)
+    part = part_between(joined(ring, ring), places[0], places[0] + forward)
     part[[0, -1]] = start, end
     return part
 
@@ -406,11 +386,10 @@ def _with_bags(pattern: Pattern, pocket: Pocket) -> Pattern:
             Edge(name="opening", points=np.array([[0.0, 0.0], [0.0, length]]), kind="cut", allowance=NARROW),
             Edge(name="rim", points=around),
         ]
-        return _pocket_piece(
-            title, piece, edges, both, paired=True,
+        return new_piece(
+            title, piece, edges, "pocket", quantity=both, paired=True,
             internal_lines={name: np.array([[-0.012, y], [0.0, y]]) for name, y in marked.items()},
             grain=np.array([[-0.5 * deep, 0.1 * length], [-0.5 * deep, 0.7 * length]]),
         )  # fmt: skip
 
-    pattern = with_pieces(pattern, map(bag, in_sizes(pattern, side.piece)))
-    return copies_sewn(pattern, "pocket bag", title, "rim")
+    return copies_sewn(redrawn(pattern, side.piece, bag), "pocket bag", title, "rim")

@@ -22,8 +22,11 @@ from warpflat.garment.construction.edges import (
     Place,
     beside,
     direction,
+    edge_at,
     in_sizes,
+    lines_ending_on,
     neighbour,
+    redrawn,
     sewn,
     trimmed,
     up_and_across,
@@ -103,20 +106,18 @@ def with_shaped_waistband(
     cut = dict[Place, tuple[str, bool]]()
     for name, edge in places:
         title, whole = f"{name}_waistband", shell.piece(name, shell.sample)
-        made = list[Piece]()
-        for piece in in_sizes(pattern, name):
+
+        def banded(piece: Piece, edge: str = edge, title: str = title) -> tuple[Piece, Piece]:
             strip = strip_along(piece, [edge], width)
             band = [replace(part, kind="seam", allowance=None) if part.name == INNER else part for part in strip]
             middle = np.concatenate([part.points for part in band]).mean(axis=0)
             # Twice as often as its piece: the outside and its facing.
-            made += [
-                without_strip(piece, strip, f"{edge} seam"),
-                strip_piece(
-                    piece, band, title, "waistband", quantity=2 * piece.quantity, paired=piece.paired and piece.quantity % 2 == 0,
-                    grain=middle + np.outer([-0.015, 0.015], up_and_across(piece)[0]), internal_lines={},
-                ),
-            ]  # fmt: skip
-        pattern = with_pieces(pattern, made)
+            return without_strip(piece, strip, f"{edge} seam"), strip_piece(
+                piece, band, title, "waistband", quantity=2 * piece.quantity, paired=piece.paired and piece.quantity % 2 == 0,
+                grain=middle + np.outer([-0.015, 0.015], up_and_across(piece)[0]), internal_lines={},
+            )  # fmt: skip
+
+        pattern = redrawn(pattern, name, banded)
         before, after = beside(whole, edge)
         cut |= {(name, before): (title, False), (name, after): (title, True)}
         parts |= {(name, each): SeamSide(piece=title, edge=each) for each in (before, after)}
@@ -169,7 +170,6 @@ def slant_rises(
     Raises:
         InputError: no edge is met by a line of such a name; gives the nearest.
     """
-    import shapely
     from scipy.interpolate import PchipInterpolator
 
     found, met = dict[Place, tuple[FloatArray, FloatArray]](), set[str]()
@@ -178,15 +178,8 @@ def slant_rises(
         for side in chain.sides:
             piece = pattern.piece(side.piece, size)
             edge = piece.edge(side.edge)
-            line = shapely.LineString(edge.points)
             crossed = [(neighbour(piece, side.edge, end)[0], end * edge.length) for end in (0, 1)]
-            crossed += [
-                (key, float(line.project(shapely.Point(point))))
-                for key, points in piece.internal_lines.items()
-                for point in points[[0, -1]]
-                if line.distance(shapely.Point(point)) < ON_EDGE
-            ]
-            for key, place in crossed:
+            for key, place in [*crossed, *lines_ending_on(edge.points, piece.internal_lines)]:
                 key = other_side(key) if side.mirrored else key
                 met.add(key)
                 here = start + (edge.length - place if side.reversed else place)
@@ -203,8 +196,7 @@ def slant_rises(
         at = at[np.diff(at, prepend=-np.inf) > ON_EDGE]
         values = np.array([knots[place] for place in at.tolist()])
         for side, begin in zip(chain.sides, starts, strict=True):
-            points = pattern.piece(side.piece, size).edge(side.edge).points
-            arc = arc_lengths(points)
+            arc = arc_lengths(edge_at(pattern, side, size).points)
             arc = np.unique(np.concatenate([arc, np.linspace(0.0, arc[-1], _SLANTED)]))
             along = np.clip(begin + (arc[-1] - arc if side.reversed else arc), at[0], at[-1])
             wide = PchipInterpolator(at, values)(along) if len(at) > 1 else np.full(len(arc), values[0])
@@ -253,7 +245,7 @@ def _with_moved_notches(
     # The strip lies at the start of the edge after the waist, and at the end of the one before it.
     at_start, width, by_size = cut[side.piece, side.edge][1] != side.reversed, widths[side.piece, side.edge], {}
     for size in pattern.pieces:
-        length = pattern.piece(side.piece, size).edge(side.edge).length
+        length = edge_at(pattern, side, size).length
         places = [share * length - (width if at_start else 0.0) for share in seam.of_size(size).notches or ()]
         by_size[size] = tuple(p / (length - width) for p in places if 0.0 < p < length - width)
     return replace(seam, notches=by_size[pattern.sample], size_notches=by_size)

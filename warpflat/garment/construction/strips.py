@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from warpflat.core import FloatArray, InputError, part_between, polyline_length
-from warpflat.garment.construction.edges import bezier
+from warpflat.garment.construction.edges import bezier, joined, new_piece
 from warpflat.pattern import Edge, Piece, drawn_length
 
 __all__ = ["CLOTH_WIDTH", "NARROW", "Strip", "folded_strip", "panel_count", "strip_edges", "swept"]
@@ -47,6 +47,10 @@ class Strip:
     even: bool = False
     tip: float | None = None
     lean: float = 0.0
+
+    def edges(self, **how: Any) -> list[Edge]:
+        """Return its edges, as :func:`strip_edges` does."""
+        return strip_edges(*swept(self), **how)
 
 
 def panel_count(width_of: Callable[[int], float], cloth_width: float) -> int:
@@ -154,14 +158,11 @@ def folded_strip(
         other: more lines and marks.
     """
     fold = np.array([[0.0, width], [length, width]])
-    edges = strip_edges(*swept(Strip(length=length, height=2.0 * width)), kinds="cut", allowance=allowance)
+    edges = Strip(length=length, height=2.0 * width).edges(kinds="cut", allowance=allowance)
     lines = {"fold line": fold, **other.pop("internal_lines", {})}
     if grain is not None:
         other["grain"] = np.array([[grain[0], grain[1]], [1.0 - grain[0], grain[1]]]) * [length, width]
-    return Piece(
-        name=name, size=like.size, fabric=like.fabric, quantity=quantity, edges=edges, role=role, paired=False,
-        internal_lines=lines, **other,
-    )  # fmt: skip
+    return new_piece(name, like, edges, role, quantity=quantity, internal_lines=lines, **other)
 
 
 def _rounded(before: FloatArray, after: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
@@ -171,5 +172,5 @@ def _rounded(before: FloatArray, after: FloatArray, radius: float) -> tuple[Floa
     kept = part_between(before, 0.0, lengths[0] - radius), part_between(after, radius, lengths[1])
     curve = bezier(kept[0][-1], before[-1], kept[1][0], count=13)
     if lengths[0] > lengths[1]:
-        return np.vstack([kept[0][:-1], curve]), kept[1]
-    return kept[0], np.vstack([curve, kept[1][1:]])
+        return joined(kept[0], curve), kept[1]
+    return kept[0], joined(curve, kept[1])

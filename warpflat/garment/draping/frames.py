@@ -1,4 +1,4 @@
-"""The way of the cloth from the designed surface to rest: frames in `frames.usdc`, and a small film for the review page."""
+"""The way of the cloth from the designed surface to rest, as frames in `frames.usdc`."""
 
 from __future__ import annotations
 
@@ -9,41 +9,30 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import FloatArray, latest_file
+from warpflat.core import latest_file
 from warpflat.garment.draping.result import Drape
 from warpflat.pattern import (
     ENERGY,
-    PIXELS_AROUND,
-    SIDES,
     SKIN,
-    Body,
     Scale,
-    Shot,
     begin_stage,
     corner_mean,
     define_group,
     define_mesh,
-    dress,
     export_stage,
     last_values_as_defaults,
     linear_rgb,
-    on_paper,
     part_path,
     set_face_map,
     set_points,
     usd_errors,
-    view_from_side,
-    write_moving_picture,
 )
 
-__all__ = ["choose_frames", "write_drape_film", "write_drape_frames"]
+__all__ = ["choose_frames", "gap_scale", "write_drape_frames"]
 
 _COUNT = 30
-_RATE, _HEIGHT = 12, 420
 # Room between the worn garment and the surfaces beside it [m].
 _BESIDE = 0.3
-
-
 # The least upper end of the scale of gaps [m].
 _LEAST_GAP = 0.005
 # Way from one frame to the next below which nothing is seen to move [m].
@@ -66,6 +55,11 @@ def choose_frames(frames: Sequence[NDArray[np.float32]], count: int = _COUNT) ->
     # Half by displacement and half by time, for what creeps is worth a look too.
     progress = np.cumsum(moves) / max(sum(moves), 1e-12) + np.linspace(0.0, 1.0, len(moving))
     return sorted({moving[int(np.abs(progress - share).argmin())] for share in np.linspace(0.0, 2.0, count)})
+
+
+def gap_scale(drape: Drape) -> Scale:
+    """Return the colours of the gap to the body over all frames [m]."""
+    return Scale.from_zero(drape.gap, drape.areas, _LEAST_GAP, ENERGY)
 
 
 def write_drape_frames(path: Path, drape: Drape) -> None:
@@ -108,7 +102,7 @@ def write_drape_frames(path: Path, drape: Drape) -> None:
         body.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set([Gf.Vec3f(*linear_rgb(SKIN).tolist())])
         cloth = define_mesh(stage, "/World/drape/cloth", drape.cloth.faces)
         colours = cloth.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
-        scale = Scale.from_zero(drape.gap, drape.areas, _LEAST_GAP, ENERGY)
+        scale = gap_scale(drape)
         colours.GetAttr().SetCustomData({"quantity": "gap", "unit": "m", "rangeMin": 0.0, "rangeMax": scale.high})
         for time, number in enumerate(chosen, start=begin):
             points = drape.frames[number].astype(np.float64)
@@ -125,36 +119,3 @@ def write_drape_frames(path: Path, drape: Drape) -> None:
                 gaps = corner_mean(drape.gap[drape.cloth.welded], faces)
                 set_face_map(layer, shown[name], "gap", gaps, unit="m", state="draped")
     export_stage(stage, path)
-
-
-def write_drape_film(path: Path, drape: Drape) -> None:
-    """Draw the frames from the front, the left and the back as a moving picture, coloured by the gap to the body.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    from PIL import Image
-
-    scale = Scale.from_zero(drape.gap, drape.areas, _LEAST_GAP, ENERGY)
-    first, everything = (rows.astype(np.float64) for rows in (drape.frames[0], np.concatenate(drape.frames)))
-    body = Body(vertices=drape.body.shrunk, faces=drape.body.triangles)
-    dressed, facets, count = dress(body, first, drape.cloth.faces, room=everything)
-    inner = dressed[len(first) :]
-    # All frames show the same room, as high as the picture.
-    shown = np.concatenate([everything, dressed[facets.used]])
-    per_metre = (_HEIGHT - 2 * PIXELS_AROUND) / float(np.ptp(shown[:, 1]))
-    rooms = dict[float, FloatArray]()
-    for _, degrees in SIDES:
-        rooms[degrees] = shown @ view_from_side(dressed, facets, degrees).directions.T
-    skin, pictures = np.tile(SKIN, (count, 1)), []
-    for number in choose_frames(drape.frames):
-        points = drape.frames[number].astype(np.float64)
-        colours = np.concatenate([scale.rgb(corner_mean(drape.body.gaps(points), drape.cloth.faces)), skin])
-        sides = []
-        for degrees, room in rooms.items():
-            view = view_from_side(np.concatenate([points, inner]), facets, degrees)
-            shot = Shot(view, per_metre, low=room.min(axis=0), size=np.ptp(room, axis=0))
-            sides.append(on_paper(shot.pixels(colours)))
-        pictures.append(Image.fromarray(np.concatenate(sides, axis=1)))
-    durations = [1000 // _RATE] * (len(pictures) - 1) + [2000]
-    write_moving_picture(path, pictures, durations)

@@ -1,32 +1,47 @@
-"""`drape.png`: a garment on the body from three sides, with maps of gap, strain and shear; `compare-drape.png`: it in several cloths."""
+"""The pictures of a drape.
+
+`drape.png`: the garment on the body from three sides, with maps of gap, strain and shear; `compare-drape.png`: it in several cloths;
+`drape.webp`: how it comes to rest; `corrected.png`: the outlines of the pieces before and after the correction of the pattern.
+"""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from warpflat.core import FloatArray
+from warpflat.garment.draping.frames import choose_frames, gap_scale
 from warpflat.garment.draping.result import Drape
 from warpflat.pattern import (
     PAGE_WIDTH,
+    PIXELS_AROUND,
     SIDES,
-    SKIN,
     Body,
     Facets,
     Scale,
+    Shot,
     View,
     corner_mean,
     draw_row,
     drawn_page,
     dress,
+    on_paper,
+    outline_edges,
     view_from_side,
+    write_moving_picture,
 )
 
-__all__ = ["write_compared_drapes", "write_drape_picture"]
+if TYPE_CHECKING:
+    from warpflat.garment.draping.correct_pattern import Correction
+
+__all__ = ["write_compared_drapes", "write_correction_picture", "write_drape_film", "write_drape_picture"]
 
 _TALLEST, _TALLEST_COMPARED, _TOP, _MARGIN, _BAR, _GAP = 8.0, 4.2, 0.48, 0.3, 1.0, 0.2  # [in]
+# Of the film: pictures in a second, and their height [pixels].
+_RATE, _FILM_HEIGHT = 12, 420
 
 
 def write_drape_picture(path: str | os.PathLike[str], drape: Drape) -> None:
@@ -54,6 +69,36 @@ def write_compared_drapes(path: str | os.PathLike[str], drapes: Mapping[str, Dra
     views = {name: view_from_side(points, facets, 0.0) for name, (points, facets, _) in dressed.items()}
     skins = [skin for _, _, skin in dressed.values()]
     _write_maps(path, "", views, skins, _maps(list(drapes.values())), _TALLEST_COMPARED)
+
+
+def write_drape_film(path: str | os.PathLike[str], drape: Drape) -> None:
+    """Draw the frames from the front, the left and the back as a moving picture, coloured by the gap to the body.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    from PIL import Image
+
+    scale, count = gap_scale(drape), len(drape.positions)
+    everything = np.concatenate(drape.frames).astype(np.float64)
+    dressed, facets, skin = _dressed(drape, everything)
+    # All frames show the same room, as high as the picture.
+    shown = np.concatenate([everything, dressed[facets.used[facets.used >= count]]])
+    per_metre = (_FILM_HEIGHT - 2 * PIXELS_AROUND) / float(np.ptp(shown[:, 1]))
+    rooms = dict[float, FloatArray]()
+    for _, degrees in SIDES:
+        rooms[degrees] = shown @ view_from_side(dressed, facets, degrees).directions.T
+    pictures = []
+    for number in choose_frames(drape.frames):
+        points = drape.frames[number].astype(np.float64)
+        colours = np.concatenate([scale.rgb(corner_mean(drape.body.gaps(points), drape.cloth.faces)), skin])
+        sides = []
+        for degrees, room in rooms.items():
+            view = view_from_side(np.concatenate([points, dressed[count:]]), facets, degrees)
+            shot = Shot(view, per_metre, low=room.min(axis=0), size=np.ptp(room, axis=0))
+            sides.append(on_paper(shot.pixels(colours)))
+        pictures.append(Image.fromarray(np.concatenate(sides, axis=1)))
+    write_moving_picture(path, pictures, [1000 // _RATE] * (len(pictures) - 1) + [2000])
 
 
 _PRESSURE = "pressure [kPa]"
@@ -84,11 +129,10 @@ def _maps(drapes: list[Drape]) -> dict[str, tuple[list[FloatArray], Scale]]:
     }
 
 
-def _dressed(drape: Drape) -> tuple[FloatArray, Facets, FloatArray]:
-    """Return vertices and facets of the worn cloth and of the body around it, and the colours of the body's faces."""
+def _dressed(drape: Drape, room: FloatArray | None = None) -> tuple[FloatArray, Facets, FloatArray]:
+    """Return vertices and facets of the worn cloth and of the body around it or a `room`, and the colours of the body's faces."""
     body = Body(vertices=drape.body.shrunk, faces=drape.body.triangles)
-    points, facets, count = dress(body, drape.positions, drape.cloth.faces)
-    return points, facets, np.tile(SKIN, (count, 1))
+    return dress(body, drape.positions, drape.cloth.faces, room)
 
 
 def _write_maps(
@@ -115,3 +159,49 @@ def _write_maps(
             left = _MARGIN + aside
             draw_row(pen, views, colours, left=left, bottom=bottom, inches_per_metre=per_metre, gap=_GAP)
             pen.colour_bar(scale, PAGE_WIDTH - 0.75, bottom + 0.1 * tall, 0.16, 0.75 * tall)
+
+
+# Of a correction: room between pieces [m], inches per metre, the largest page [in], and colours before and after.
+_BETWEEN, _SCALE, _LARGEST, _BEFORE, _AFTER = 0.06, 8.0, 60.0, "#8a8a8a", "#c8452c"
+# Changes of the outline that are written beside it: the largest ones of a piece, so far apart [m].
+_LABELS, _APART, _LEAST = 6, 0.08, 1e-3
+
+
+def write_correction_picture(path: str | os.PathLike[str], correction: Correction) -> None:
+    """Draw the outlines before in grey and after in red, with the largest changes in millimetres; positive is outwards.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    old, new, moved = correction.before.cloth, correction.after.cloth, correction.moved()
+    edges = outline_edges(old.flat_faces)
+    shift, x = np.zeros_like(old.flat), 0.0
+    for rows in old.piece_vertices.values():
+        low, high = old.flat[rows].min(axis=0), old.flat[rows].max(axis=0)
+        shift[rows] = [x - low[0], -low[1]]
+        x += float(high[0] - low[0]) + _BETWEEN
+    tall = float((old.flat + shift)[:, 1].max())
+    scale = min(_SCALE, _LARGEST / max(x, tall))
+    first, last = correction.rounds[0], correction.rounds[-1]
+    words = (
+        f"Outlines before (grey) and after (red); changes outwards in mm. Misfit {1e3 * first.misfit:.2f} mm before, "
+        f"{1e3 * last.misfit:.2f} mm after"
+    )
+    with drawn_page(path, max(scale * x, 9.0) + 2 * _MARGIN, scale * tall + 2 * _MARGIN + 0.4, dpi=110) as pen:
+        pen.write(_MARGIN, pen.height - 0.25, words, 11)
+        before, after = (scale * (flat + shift) + _MARGIN for flat in (old.flat, new.flat))
+        pen.segments(before[edges], colour=_BEFORE, width=1.4)
+        pen.segments(after[edges], colour=_AFTER, width=1.1)
+        for name, rows in old.piece_vertices.items():
+            points = before[rows]
+            across, up = points.mean(axis=0).tolist()
+            pen.write(across, up, name, 10, ha="center")
+            # The largest changes stand beside the outline, not too near to each other.
+            change, taken = moved[name], list[FloatArray]()
+            for i in np.argsort(-np.abs(change), kind="stable").tolist():
+                if len(taken) == _LABELS or abs(change[i]) < _LEAST:
+                    break
+                if all(np.linalg.norm(points[i] - other) > scale * _APART for other in taken):
+                    taken.append(points[i])
+                    across, up = points[i].tolist()
+                    pen.write(across, up, f"{1e3 * change[i]:+.1f}", 8, color=_AFTER, va="bottom")

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from warpflat.core import file_in, latest_file, optional_file, output_folder
-from warpflat.garment.draping.frames import write_drape_film, write_drape_frames
-from warpflat.garment.draping.picture import write_drape_picture
+from warpflat.garment.draping.frames import write_drape_frames
+from warpflat.garment.draping.picture import write_drape_film, write_drape_picture
 from warpflat.garment.draping.result import Drape
 from warpflat.garment.draping.sewn_cloth import worn_surface
 from warpflat.pattern import write_obj, write_sewn_usd

@@ -8,6 +8,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, IntArray
 from warpflat.flat import join_labels, triangulate
+from warpflat.pattern.export.colours import SKIN
 from warpflat.pattern.export.geometry import outline_edges
 from warpflat.pattern.export.views import Facets, make_facets
 
@@ -34,8 +35,8 @@ class Body:
 
 def dress(
     body: Body, worn: FloatArray, faces: IntArray, room: FloatArray | None = None
-) -> tuple[FloatArray, Facets, int]:
-    """Return a worn garment and then the body around it: vertices, facets, and how many faces the body has.
+) -> tuple[FloatArray, Facets, FloatArray]:
+    """Return a worn garment and then the body around it: vertices, facets, and the colours of the body's faces (sRGB).
 
     Outlines of pieces, which have vertices of their own, show the seams; the body has none.
 
@@ -47,7 +48,8 @@ def dress(
     """
     near, skin = crop_body(body, worn if room is None else room)
     all_faces = np.concatenate([faces, np.column_stack([near + len(worn), np.full(len(near), -1)])])
-    return np.concatenate([worn, skin]), make_facets(all_faces.astype(np.int32), outline_edges(faces)), len(near)
+    facets = make_facets(all_faces.astype(np.int32), outline_edges(faces))
+    return np.concatenate([worn, skin]), facets, np.tile(SKIN, (len(near), 1))
 
 
 def crop_body(body: Body, worn: FloatArray) -> tuple[IntArray, FloatArray]:

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from warpflat.core import FloatArray, IntArray
-from warpflat.flat import Surface
+from warpflat.flat import Surface, join_surfaces
 from warpflat.pattern.drafting.placement import LabelRoom, Spot
-from warpflat.pattern.export.colours import DRAFTED_CLOTH, SKIN, SMALLEST_SCALE, Scale, energy_scale
+from warpflat.pattern.export.colours import DRAFTED_CLOTH, SMALLEST_SCALE, Scale, energy_scale
 from warpflat.pattern.export.dressed import Body, dress
 from warpflat.pattern.export.figure import GRAIN, GREY, INK, LABEL_SIZE, MARGIN, PAGE_WIDTH, Pen, drawn_page
 from warpflat.pattern.export.geometry import face_areas, polylines_of
@@ -330,21 +330,16 @@ class _Band:
         self, body: Body, pieces: Sequence[PicturePiece], drafted: Sequence[DraftedOutline], scale: Scale
     ) -> None:
         flattened, others = [piece.surface for piece in pieces], [surface for each in drafted for surface in each.worn]
-        surfaces = [*flattened, *others]
-        counts = np.cumsum([0, *(len(surface.vertices) for surface in surfaces)])
-        faces = [
-            np.where(surface.faces >= 0, surface.faces + first, -1)
-            for surface, first in zip(surfaces, counts, strict=False)
-        ]
-        worn = np.concatenate([surface.vertices for surface in surfaces])
-        points, facets, skin = dress(body, worn, np.concatenate(faces).astype(np.int32))
+        worn = join_surfaces([*flattened, *others])
+        points, facets, skin = dress(body, worn.vertices, worn.faces)
         self._views = {title: view_from_side(points, facets, degrees) for title, degrees in SIDES}
         for view in self._views.values():
-            view.points[: len(worn), 2] += _NEARER
-            view.points[counts[len(flattened)] : len(worn), 2] += _OVER
+            cloth = view.points[: len(worn.vertices), 2]
+            cloth += _NEARER
+            cloth[sum(len(surface.vertices) for surface in flattened) :] += _OVER
         density = np.concatenate([np.asarray(piece.face_energy_density, dtype=np.float64) for piece in pieces])
-        plain = np.tile(DRAFTED_CLOTH, (sum(len(surface.faces) for surface in others), 1)), np.tile(SKIN, (skin, 1))
-        self._colours = np.concatenate([scale.rgb(density), *plain])
+        plain = np.tile(DRAFTED_CLOTH, (len(worn.faces) - len(density), 1))
+        self._colours = np.concatenate([scale.rgb(density), plain, skin])
         # What the body shows of drafted pieces, and which lie within the garment.
         within = dict.fromkeys(each.name.partition(", ")[0] for each in drafted if not each.worn)
         words = ["grey: drafted for its edges, laid by its seams"] if others else []
