@@ -24,7 +24,7 @@ from warpflat.garment.mannequin.forms import form_names, shipped_form
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.shapes import shaped_form
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "mannequin"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "garment" / "mannequin"))
 from armhole_curves import corner_degrees, depth_inside, inflections, sharpest_turn
 
 SCANS = ("female", "male", "male_heavy", "child")

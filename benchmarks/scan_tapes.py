@@ -21,7 +21,7 @@ from warpflat.core.errors import InputError
 from warpflat.flat.surface.io.read import read_scan
 from warpflat.garment.mannequin.mannequin import Mannequin
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "mannequin"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "garment" / "mannequin"))
 from body_copies import COPIES, as_given, copy_of_body
 from body_tapes import armpit_and_crotch, tapes
 from landmarks import Landmarks

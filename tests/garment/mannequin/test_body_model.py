@@ -80,6 +80,20 @@ def test_nearest_places_are_those_of_a_search_over_all_triangles() -> None:
         np.testing.assert_allclose(weight @ vertices[triangles[face]], place, atol=1e-5)
 
 
+def test_a_place_on_an_edge_has_one_normal_whichever_triangle_it_is_told_of() -> None:
+    # Two faces of a roof; vertex normals by area.
+    roof = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, -1.0, 0.0], [-1.0, -2.0, 0.0]])
+    mesh = Mesh(roof, np.array([[0, 1, 2], [1, 0, 3]]))
+    weights = np.array([[0.3, 0.7, 0.0], [0.7, 0.3, 0.0]])
+    first, second = mesh.normals_at(np.array([0, 1]), weights)
+    np.testing.assert_allclose(first, second, atol=1e-15)
+    assert np.linalg.norm(first) == pytest.approx(1.0)
+    assert mesh.normals[0] @ mesh.normals[1] < 0.5
+    # Inside a triangle it is nearer to that one's own.
+    inside = mesh.normals_at(np.array([0]), np.array([[0.2, 0.2, 0.6]]))[0]
+    assert inside @ mesh.normals[0] > first @ mesh.normals[0] + 0.01
+
+
 @pytest.mark.parametrize("arms", [0.8, -0.5])
 def test_a_fit_finds_a_person_of_the_model(arms: float) -> None:
     model, random = BodyModel.load(), np.random.default_rng(4)

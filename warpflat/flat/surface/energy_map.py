@@ -384,7 +384,8 @@ def _place(
 
 
 def _by_distance(distances: Mapping[str, float]) -> dict[str, float]:
-    return dict(sorted(distances.items(), key=lambda item: item[1]))
+    # Lines that are equally near, to the micrometre, stay in the surface's order.
+    return dict(sorted(distances.items(), key=lambda item: round(item[1], 6)))
 
 
 @once_per_surface

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from warpflat.core import FloatArray, IntArray, guarded, polyline_length
+from warpflat.core import FloatArray, IntArray, guarded
 from warpflat.flat import (
     DEFAULT_FABRIC,
     CutPattern,
@@ -58,12 +58,8 @@ def garment_as_cut(
         surface.name: laid_as_cut(surface, panel.cut, fabric=fabric, device=device)
         for panel, surface in zip(panels, surfaces, strict=True)
     }
-    seams = []
-    for pair in meeting_borders({surface.name: surface for surface in surfaces}):
-        one, other = (
-            polyline_length(pieces[piece].positions[row]) for piece, row in zip(pair.pieces, pair.vertices, strict=True)
-        )
-        seams.append(replace(pair, sides=pair.pieces, ratio=one / other, eased=True))
+    borders = meeting_borders({surface.name: surface for surface in surfaces})
+    seams = [replace(pair.as_laid(pieces), sides=pair.pieces) for pair in borders]
     compared = CutPattern(
         unit=panels[0].unit,
         area_ratio=sum(panel.area for panel in panels) / sum(panel.worn_area for panel in panels),

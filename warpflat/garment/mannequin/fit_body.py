@@ -63,6 +63,7 @@ class Mesh:
         cross = np.cross(b - a, c - a)
         self.area = 0.5 * np.linalg.norm(cross, axis=1)
         self.normals = cross / np.maximum(2.0 * self.area, 1e-300)[:, None]
+        self._outwards = vertex_normals(vertices, triangles)
         self._mesh = wp.Mesh(
             points=wp.array(vertices, dtype=wp.vec3, device="cpu"),
             indices=wp.array(triangles.ravel(), dtype=wp.int32, device="cpu"),
@@ -76,6 +77,14 @@ class Mesh:
         launch_quietly(find_closest, dim=len(points), inputs=given, outputs=[face, weight], device="cpu")
         found, share = face.numpy().astype(np.int64), weight.numpy().astype(np.float64)
         return found, share, np.einsum("pk,pka->pa", share, self.vertices[self.triangles[found]])
+
+    def normals_at(self, face: NDArray[np.int64], weights: FloatArray) -> FloatArray:
+        """Return the unit normals at places on triangles (#P, with weights #P by 3), #P by 3, that change smoothly over the mesh.
+
+        The nearest place is often on an edge, where rounding decides to which of its two triangles it belongs.
+        """
+        mean = np.einsum("pk,pka->pa", weights, self._outwards[self.triangles[face]])
+        return np.asarray(mean / np.maximum(np.linalg.norm(mean, axis=1), 1e-300)[:, None])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -155,8 +164,8 @@ def fit_body(
         for _ in range(steps):
             person, cost = _step(fine, normals[plain], scan, known, person, preference, reach, shapes=True, sits=sits)
     posed = model.vertices(person)
-    found, _, place = mesh.closest(posed)
-    alike = np.einsum("va,va->v", vertex_normals(posed, model.triangles), mesh.normals[found]) > _ALIKE
+    found, weights, place = mesh.closest(posed)
+    alike = np.einsum("va,va->v", vertex_normals(posed, model.triangles), mesh.normals_at(found, weights)) > _ALIKE
     distance = np.where(alike, np.linalg.norm(posed - place, axis=1), np.inf)
     return FittedBody(person=person, distance=distance, cost=cost)
 

@@ -27,6 +27,8 @@ _SCOOP = 0.012
 # The biceps' row lies so far [m] beyond the underarm that the shortest sleeve has a seam to sew.
 _SHORTEST_SLEEVE = 0.087
 _HARMONICS = 5
+# A point of a section outside a window counts by so much less for each metre that it lies outside.
+_STEEP = 10.0
 # Where an arm is sliced between biceps (0), elbow (1) and wrist (2): forearms swell below the elbow.
 _ARM_PLACES = (0.5, 1.25, 1.5, 1.75)
 _NOTCH = 0.22
@@ -183,10 +185,25 @@ def underarm_point(body: BodySections, side: str, underbust: float) -> FloatArra
     z = 0.25 * float(sum(middles))
     points = np.concatenate([p.points for p in body.slicer.cut(np.array([0.0, 1.0, 0.0]), height)])
     reach = float(np.interp(height, t.y, t.left if sign > 0 else t.right))
-    beside = points[
-        (np.abs(points[:, 2] - z) < 0.006) & (sign * points[:, 0] > 0.0) & (sign * points[:, 0] < reach + 0.002)
-    ]
-    return np.array([sign * (float((sign * beside[:, 0]).max()) if len(beside) else reach), height, z])
+    out = sign * points[:, 0]
+    trunk = (out > 0.0) & (out < reach + 0.002)
+    return np.array([sign * _outermost(out[trunk], points[trunk, 2] - z, 0.006, reach), height, z])
+
+
+def _outermost(out: FloatArray, off: FloatArray, width: float, otherwise: float) -> float:
+    """Return how far out a section reaches within a window.
+
+    A section is points where it crosses the mesh's edges. One just outside the window counts, too, by so much less: where the window's
+    end meets a point, rounding would decide whether it counts.
+
+    Args:
+        out: of the section's points, how far out they lie [m].
+        off: how far they lie from the window's middle, along the section [m].
+        width: half of the window [m].
+        otherwise: what is returned where no point lies in the window [m].
+    """
+    beyond = np.abs(off) - width
+    return float((out - _STEEP * np.maximum(beyond, 0.0)).max()) if (beyond < 0.0).any() else otherwise
 
 
 def _hole_points(body: BodySections, side: str, through: FloatArray, lean: float, outward: float) -> FloatArray:
@@ -230,10 +247,10 @@ def _armhole(body: BodySections, side: str, under: FloatArray) -> FloatArray:
     # From just above the armpit a quarter of an ellipse runs down to the underarm point, front and back.
     level = armpit + _SCOOP * body.stature
     points = [ring[ring[:, 1] > level]]
-    near = ring[np.abs(ring[:, 1] - level) < 0.005 * body.stature]
     turn = np.linspace(0.0, 0.5 * np.pi, 24)[:, None]
-    for end in (near[np.argmin(near[:, 2])], near[np.argmax(near[:, 2])]):
-        across, down = np.array([0.0, 0.0, end[2] - under[2]]), (level - under[1]) / up[1] * up
+    for face in (-1.0, 1.0):
+        end = face * _outermost(face * ring[:, 2], ring[:, 1] - level, 0.005 * body.stature, face * under[2])
+        across, down = np.array([0.0, 0.0, end - under[2]]), (level - under[1]) / up[1] * up
         points.append(under + 0.001 * normal + np.sin(turn) * across + (1.0 - np.cos(turn)) * down)
     hole = _loop(np.concatenate(points), under, -up, np.array([0.0, 0.0, 1.0]), _HARMONICS, below=under)
     # Few harmonics round the curve off below the underarm point, and tilt it there where that lies off the middle.
@@ -273,11 +290,7 @@ def _row(slicer: Slicer, notch: FloatArray, face: str) -> FloatArray:
     points = np.concatenate([p.points for p in slicer.cut(np.array([0.0, 1.0, 0.0]), float(notch[1]))])
     side = np.sign(notch[0])
     x = np.linspace(0.0, abs(notch[0]), 30)
-    width = x[1]
-    z = np.empty_like(x)
-    for i, at in enumerate(x):
-        near = points[np.abs(side * points[:, 0] - at) < width]
-        z[i] = sign * (sign * near[:, 2]).max() if len(near) else notch[2]
+    z = np.array([sign * _outermost(sign * points[:, 2], side * points[:, 0] - at, x[1], sign * notch[2]) for at in x])
     fit = np.polynomial.Polynomial.fit(x / x[-1], z - notch[2], 5)(x / x[-1])
     z = notch[2] + fit - fit[-1] * (x / x[-1]) ** 3
     return np.column_stack([side * x, np.full_like(x, notch[1]), z])
@@ -290,10 +303,8 @@ def _centre(slicer: Slicer, bottom: FloatArray, chest: FloatArray, top: FloatArr
     points = np.concatenate([p.points for p in slicer.cut(np.array([1.0, 0.0, 0.0]), 1e-4)])
     z = np.interp(y, [bottom[1], chest[1], top[1]], [bottom[2], chest[2], top[2]])
     for i in range(2, len(y) - 1):
-        near = points[np.abs(points[:, 1] - y[i]) < 0.006]
-        near = near[np.abs(near[:, 2] - z[i]) < 0.05]
-        if len(near):
-            z[i] = sign * (sign * near[:, 2]).max()
+        near = points[np.abs(points[:, 2] - z[i]) < 0.05]
+        z[i] = sign * _outermost(sign * near[:, 2], near[:, 1] - y[i], 0.006, sign * z[i])
     z[1:-1] = np.convolve(z, [0.25, 0.5, 0.25], mode="same")[1:-1]
     return np.column_stack([np.zeros_like(y), y, z])
 

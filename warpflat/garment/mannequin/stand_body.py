@@ -169,16 +169,19 @@ def lay_on_scan(start: FloatArray, mesh: Mesh, patched: BoolArray) -> tuple[Floa
     )
     # Scanners and cloth span webs between arms and trunk.
     nearer = 1.0 - _WEB * np.minimum(1.0, 4.0 * arms * near)
+    on_patch = np.zeros(len(mesh.vertices))
+    on_patch[mesh.triangles[patched]] = 1.0
     for stiffness, far_at_most in _STAGES:
         reach = far_at_most * nearer
         normals = vertex_normals(points, triangles)
-        found, _, place = mesh.closest(points)
+        found, share, place = mesh.closest(points)
         away = place - points
         far = np.linalg.norm(away, axis=1)
         along = np.einsum("va,va->v", away, normals)
-        alike = np.einsum("va,va->v", normals, mesh.normals[found]) > _ALIKE
-        # Beside the border of a hole the nearest place does not lie along the normal.
-        seen = alike & (far < reach) & (np.abs(along) > 0.8 * far - 0.002) & ~patched[found]
+        alike = np.einsum("va,va->v", normals, mesh.normals_at(found, share)) > _ALIKE
+        # Beside the border of a hole the nearest place does not lie along the normal, or lies on the border itself.
+        closed = np.einsum("vk,vk->v", share, on_patch[mesh.triangles[found]]) > 1.0 - 1e-3
+        seen = alike & (far < reach) & (np.abs(along) > 0.8 * far - 0.002) & ~closed
         # What the scan does not show goes back to the model.
         along = np.where(seen, along, np.einsum("va,va->v", start - points, normals))
         weight = np.where(seen, 1.0 / (1.0 + (far / reach) ** 2) ** 2, _HOME)
@@ -254,9 +257,9 @@ def _stand(
     # A triangle of the scan shows the body's nearest one, if it lies on it and faces the same way.
     on = Mesh(posed, faces)
     middles = vertices[triangles].mean(axis=1)
-    shown, _, place = on.closest(middles)
+    shown, share, place = on.closest(middles)
     beside = (np.linalg.norm(place - middles, axis=1) < _ON) & (
-        np.einsum("ta,ta->t", on.normals[shown], mesh.normals) > _ALIKE
+        np.einsum("ta,ta->t", on.normals_at(shown, share), mesh.normals) > _ALIKE
     )
     shown = np.where(beside & (np.arange(len(triangles)) < scanned), shown, -1)
     relaxed, _ = _arms_hanging(model, fit.person.standing(_BENT))
