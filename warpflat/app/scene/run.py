@@ -30,7 +30,6 @@ from warpflat.core import (
     remove_stale,
     report_activity,
     require_memory_for_run,
-    require_own_metrics,
 )
 from warpflat.flat import Progress, Remedy, Surface, judge, size_words
 from warpflat.garment import (
@@ -99,7 +98,6 @@ def run_scene(
     """
     sources = (*scene.sources, *(() if cuts is None else cuts.surface.sources))
     with output_folder(out, files_of_run(scene), sources=sources, guard=True) as folder:
-        require_own_metrics(folder)
         settled, notes = settle_shape(scene, device=device)
         form = built() if built is not None and settled is scene else None
         while True:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 import shapely
 import warp as wp
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay
 
-from warpflat.core import FloatArray, InputError, IntArray, nearest, polyline_length, reflected, short_repr, start_warp
+from warpflat.core import FloatArray, InputError, nearest, polyline_length, reflected, short_repr, start_warp
 from warpflat.flat import Fabric, Surface, mirror_plane, triangulate, vertex_normals
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.check_sewn import check_sewn
@@ -26,12 +26,12 @@ from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.relax_drape import relax_drape
 from warpflat.garment.draping.result import Drape
 from warpflat.garment.draping.sew_around import sew_around
-from warpflat.garment.draping.sewn_cloth import SewnCloth
+from warpflat.garment.draping.sewn_cloth import SewnCloth, worn_surface
 from warpflat.garment.draping.thin_body import ThinBody, draw_out_limbs
 from warpflat.garment.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
 from warpflat.garment.mannequin.head import head_of
 from warpflat.garment.mannequin.mannequin import Mannequin
-from warpflat.pattern import MIRRORED, Pattern, Piece, Seam, SeamSide, is_flounce, whole_pieces
+from warpflat.pattern import MIRRORED, Edge, Pattern, Piece, Seam, SeamSide, is_flounce, whole_pieces
 
 __all__ = ["Placement", "drape_pattern", "lay_pieces", "place_drafted"]
 
@@ -218,10 +218,13 @@ def place_drafted(
         title = next((each.name for each in given if each.name in titles), "")
         outlines = [line for line_name, line in piece.internal_lines.items() if line_name.startswith("pocket")]
         for ring in shapely.get_parts(shapely.line_merge(shapely.MultiLineString(outlines))) if title else ():
-            points, triangles = _filled(np.asarray(ring.coords))
-            at = whole[name](points)
-            at = at + _ON_TOP * vertex_normals(at, triangles)
-            found.setdefault(title, []).append(_surface(f"{title} {len(found.get(title, ())) + 1}", at, triangles))
+            corners = shapely.Polygon(ring).exterior.coords
+            sides = [Edge(name=str(k), points=np.array(side)) for k, side in enumerate(pairwise(corners))]
+            patch = mesh_pieces({title: Piece(name=title, edges=sides)}, [], _COARSE)[0][title]
+            at = whole[name](patch.points)
+            at = at + _ON_TOP * vertex_normals(at, patch.triangles)
+            copies = found.setdefault(title, [])
+            copies.append(worn_surface(f"{title} {len(copies) + 1}", at, patch.triangles))
     drafted = [name for name in pieces if name not in whole]
     if not drafted:
         return found
@@ -247,31 +250,12 @@ def place_drafted(
     for name in drafted:
         title = next(each.name for each in given if name == each.name or name.startswith(each.name + " "))
         points = cloth.designed[cloth.welded[cloth.piece_vertices[name]]]
-        found.setdefault(title, []).append(_surface(name, points, meshes[name].triangles))
+        found.setdefault(title, []).append(worn_surface(name, points, meshes[name].triangles))
     return found
 
 
 def _length(pieces: Mapping[str, Piece], row: Sequence[SeamSide]) -> float:
     return sum(pieces[side.piece].edge(side.edge).length for side in row)
-
-
-def _filled(outline: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return a mesh of the inside of a convex outline: points (#P by 2 [m]) and triangles (#T by 3)."""
-    polygon = shapely.Polygon(outline)
-    low, high = polygon.bounds[:2], polygon.bounds[2:]
-    grid = np.stack(np.meshgrid(*(np.arange(a, b, _COARSE) for a, b in zip(low, high, strict=True))), axis=-1).reshape(
-        -1, 2
-    )
-    points = np.concatenate([shapely.get_coordinates(polygon.exterior.segmentize(_COARSE))[:-1], grid])
-    points = points[shapely.intersects_xy(polygon.buffer(1e-6), *points.T)]
-    return points, Delaunay(points).simplices.astype(np.int32)
-
-
-def _surface(name: str, points: FloatArray, triangles: IntArray) -> Surface:
-    return Surface(
-        vertices=points, faces=np.column_stack([triangles, np.full(len(triangles), -1)]).astype(np.int32), name=name,
-        input_vertices=points, input_index=np.arange(len(points), dtype=np.int32),
-    )  # fmt: skip
 
 
 def _dressed(

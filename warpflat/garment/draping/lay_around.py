@@ -14,7 +14,7 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from warpflat.core import BoolArray, FloatArray, InputError, IntArray, factor_symmetric, polyline_length
@@ -109,7 +109,7 @@ def lay_around(
     Raises:
         InputError: the openings are not those of a garment.
     """
-    graph, rigid = _edges(cloth), AsRigid(cloth)
+    graph, rigid = cloth.edge_lengths(), AsRigid(cloth)
     sides = set(map(tuple, border_edges(cloth.faces).tolist()))
     pairs = [
         pair for each in openings for pair in np.column_stack([each.vertices, np.roll(each.vertices, -1)]).tolist()
@@ -172,15 +172,6 @@ def lay_around(
     for hung, ring in tops:
         laid[hung, 1] += ring.centre[1] - laid[ring.vertices, 1].mean()
     return Laid(positions=laid, limbs=limbs, hooded=hooded, level=level)
-
-
-def _edges(cloth: SewnCloth) -> csr_array:
-    """Return the lengths of the edges in the flat cloth [m], #V by #V."""
-    faces = cloth.flat_faces[:, :3]
-    pair = np.concatenate([faces[:, [k, (k + 1) % 3]] for k in range(3)])
-    length = np.linalg.norm(cloth.flat[pair[:, 0]] - cloth.flat[pair[:, 1]], axis=1)
-    joined, first = np.unique(np.sort(cloth.welded[pair], axis=1), axis=0, return_index=True)
-    return coo_array((length[first], tuple(joined.T)), shape=(len(cloth.designed),) * 2).tocsr()
 
 
 def _kinds(openings: Sequence[Opening], far: FloatArray, up: FloatArray, waist: float) -> list[str]:
@@ -324,9 +315,7 @@ def _rings(
         u /= np.linalg.norm(u)
         # With the cloth on its left a border runs clockwise about the way out of it.
         axes = radius * np.array([u, -handed * np.cross(out, u)])
-        step = np.asarray(
-            graph[each.vertices, np.roll(each.vertices, -1)] + graph[np.roll(each.vertices, -1), each.vertices]
-        )
+        step = np.asarray(graph[each.vertices, np.roll(each.vertices, -1)])
         circle = np.exp(2j * np.pi * (np.cumsum(step) - step) / step.sum())
         ring = _Ring(vertices=each.vertices, circle=circle, centre=centre, axes=axes)
         if aside is None and rings:

@@ -15,6 +15,7 @@ from warpflat.garment.draping.sewn_cloth import SewnCloth, pieces_of
 from warpflat.pattern import MIRRORED, Pattern, Piece, outline_edges
 
 __all__ = [
+    "cell_matrix",
     "edge_lengths",
     "hold_seams",
     "largest_share",
@@ -74,6 +75,13 @@ def hold_seams(
     places, shape = (np.concatenate(rows), np.concatenate(columns)), (len(seams), 2 * len(flat))
     change = coo_array((np.concatenate(values), places), shape=shape).tocsr()
     return weight * (change.T @ change), weight * (change.T @ (difference - seam_differences(flat, seams)))
+
+
+def cell_matrix(blocks: FloatArray, rows: IntArray, columns: IntArray, shape: tuple[int, int]) -> csr_array:
+    """Return the sum of cells' blocks, #C by corners and coordinates of a row by those of a column, as a matrix."""
+    of_rows = np.broadcast_to(rows[:, :, :, None, None], blocks.shape)
+    of_columns = np.broadcast_to(columns[:, None, None], blocks.shape)
+    return csr_array(coo_array((blocks.ravel(), (of_rows.ravel(), of_columns.ravel())), shape=shape))
 
 
 def largest_share(cloth: SewnCloth, step: FloatArray) -> float:
