@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from warpflat.core import FloatArray, InputError, IntArray, polyline_length
+from warpflat.core import FloatArray, InputError, IntArray, polyline_length, project_on_segments, turned_left, unit
 from warpflat.garment.draping.mesh_pieces import FlatMesh, Weld
 
 __all__ = ["continue_pieces", "hang_from_edges", "hood_beside_head"]
@@ -109,10 +109,7 @@ def hang_from_edges(
         flat, best = meshes[name].points, np.full(len(meshes[name].points), np.inf)
         found[name] = np.empty((len(flat), 3))
         for own, place, down in seams:
-            a, b = flat[own[:-1]], flat[own[1:]]
-            share = np.einsum("psk,sk->ps", flat[:, None] - a, b - a) / np.maximum(((b - a) ** 2).sum(axis=1), 1e-12)
-            share = np.clip(share, 0.0, 1.0)
-            off = np.linalg.norm(flat[:, None] - a - share[..., None] * (b - a), axis=2)
+            share, off = project_on_segments(flat[:, None], flat[own[:-1]], flat[own[1:]])
             nearest_side = off.argmin(axis=1)
             points, here = np.arange(len(flat)), off.min(axis=1) < best
             at, t = nearest_side[here], share[points, nearest_side][here, None]
@@ -120,10 +117,8 @@ def hang_from_edges(
             # On the trunk it hangs, on an arm it runs on.
             way = np.where((way[:, 1] < _HANGS * np.linalg.norm(way, axis=1))[:, None], [0.0, -1.0, 0.0], way)
             out = (start - middle) * [1.0, 0.0, 1.0]
-            way = way + falling[name] * out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
-            way /= np.linalg.norm(way, axis=1, keepdims=True)
             best = np.minimum(best, off.min(axis=1))
-            found[name][here] = start + best[here, None] * way
+            found[name][here] = start + best[here, None] * unit(way + falling[name] * unit(out))
     return found
 
 
@@ -169,9 +164,8 @@ def hood_beside_head(
 def _border_frames(mesh: FlatMesh, row: IntArray) -> FloatArray:
     """Return the directions along a row of border vertices (#R) and into the piece as columns, #R by 2 by 2."""
     points = mesh.points
-    along = np.gradient(points[row], axis=0)
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
-    inwards = np.column_stack([-along[:, 1], along[:, 0]])
+    along = unit(np.gradient(points[row], axis=0))
+    inwards = turned_left(along)
     middle = points[mesh.triangles[np.isin(mesh.triangles, row).sum(axis=1) == 2]].mean(axis=1)
     place = cKDTree(points[row]).query(middle)[1]
     left = np.einsum("ta,ta->t", middle - points[row[place]], inwards[place])

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
-from warpflat.core import FloatArray, InputError, IntArray, points_at_lengths, polyline_length
+from warpflat.core import FloatArray, InputError, IntArray, points_at_lengths, polyline_length, unit
 from warpflat.flat import Fabric
 from warpflat.garment.draping.sewn_cloth import ClothPiece, SewnCloth, join_pieces, piece_slices
 from warpflat.garment.draping.worn_layer import closures
@@ -132,7 +132,7 @@ def sew_meshes(
         along = np.array([0.0, 1.0]) if grain is None else grain[1] - grain[0]
         space = np.zeros((len(mesh.points), 3)) if placed is None else placed[name]
         faces = np.pad(mesh.triangles, ((0, 0), (0, 1)), constant_values=-1)
-        cloth[name] = ClothPiece(mesh.points, faces, space, along / np.linalg.norm(along), {**mesh.lines, **mesh.edges})
+        cloth[name] = ClothPiece(mesh.points, faces, space, unit(along), {**mesh.lines, **mesh.edges})
     return join_pieces(cloth, *np.array(pairs, dtype=np.int64).reshape(-1, 2).T, fabric=fabric, turned=turned)
 
 
