@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from warpflat.core import FloatArray, InputError, IntArray, polyline_length, project_on_segments, turned_left, unit
-from warpflat.garment.draping.mesh_pieces import FlatMesh, Weld
+from warpflat.garment.draping.mesh_pieces import FlatMesh, MeshedPieces, Weld
 
 __all__ = ["continue_pieces", "hang_from_edges", "hood_beside_head"]
 
@@ -34,10 +34,7 @@ def _joins(welds: Sequence[Sequence[Weld]]) -> list[tuple[tuple[str, str], tuple
 
 
 def continue_pieces(
-    placed: Mapping[str, FloatArray],
-    meshes: Mapping[str, FlatMesh],
-    welds: Sequence[Sequence[Weld]],
-    turned_down: Collection[str] = (),
+    placed: Mapping[str, FloatArray], meshed: MeshedPieces, turned_down: Collection[str] = ()
 ) -> dict[str, FloatArray]:
     """Place bands, collars, pockets and whatever else was drafted flat: as if the cloth that they are sewn to ran on beyond the seam.
 
@@ -45,18 +42,17 @@ def continue_pieces(
 
     Args:
         placed: by piece the points (#P by 3 [m]) of those that lie.
-        meshes: all pieces.
-        welds: for each seam the vertices that it joins.
+        meshed: all pieces.
         turned_down: pieces that lie back on what they are sewn to, as the fall of a collar on its stand.
 
     Raises:
         InputError: a piece hangs together with none that lies.
     """
-    found = dict(placed)
+    found, meshes = dict(placed), meshed.meshes
     while lost := [name for name in meshes if name not in found]:
         # By piece its vertices that are sewn, the places of these, and where the piece's x and y lead from there.
         sewn: dict[str, list[tuple[IntArray, FloatArray, FloatArray]]] = {name: [] for name in lost}
-        for (name, other), (own, its) in _joins(welds):
+        for (name, other), (own, its) in _joins(meshed.welds):
             if name in lost and other in found:
                 across = _border_frames(meshes[name], own).transpose(0, 2, 1)
                 # Into this piece is out of the other one, or back into it.
@@ -79,24 +75,21 @@ def continue_pieces(
 
 
 def hang_from_edges(
-    placed: Mapping[str, FloatArray],
-    meshes: Mapping[str, FlatMesh],
-    welds: Sequence[Sequence[Weld]],
-    falling: Mapping[str, float],
+    placed: Mapping[str, FloatArray], meshed: MeshedPieces, falling: Mapping[str, float]
 ) -> dict[str, FloatArray]:
     """Place flounces and ruffles as a smooth skirt that falls from the edges to which they are sewn, without their folds.
 
     Args:
         placed: by piece the points (#P by 3 [m]) of those that lie.
-        meshes: all pieces.
-        welds: for each seam the vertices that it joins.
+        meshed: all pieces.
         falling: the pieces that are placed, with the share of its length by which each stands out.
 
     Returns:
         By piece its points, #P by 3 [m].
     """
+    meshes = meshed.meshes
     rows: dict[str, list[tuple[IntArray, FloatArray, FloatArray]]] = {name: [] for name in falling}
-    for (name, other), (own, its) in _joins(welds):
+    for (name, other), (own, its) in _joins(meshed.welds):
         if name in falling and other in placed:
             out = -_border_frames(meshes[other], its)[:, :, 1:]
             down = (_slopes(meshes[other], placed[other])[its] @ out)[:, :, 0]
@@ -123,26 +116,22 @@ def hang_from_edges(
 
 
 def hood_beside_head(
-    placed: Mapping[str, FloatArray],
-    meshes: Mapping[str, FlatMesh],
-    welds: Sequence[Sequence[Weld]],
-    hood: Collection[str],
-    beside: float,
+    placed: Mapping[str, FloatArray], meshed: MeshedPieces, hood: Collection[str], beside: float
 ) -> dict[str, FloatArray]:
     """Place the halves of a hood flat beside a head, upright as they are drawn, with the middles of their seams at the neckline's.
 
     Args:
         placed: by piece the points (#P by 3 [m]) of those that lie.
-        meshes: all pieces.
-        welds: for each seam the vertices that it joins.
+        meshed: all pieces.
         hood: the pieces of the hood; what is sewn to both sides of the neckline, such as a strip over the crown, is no half.
         beside: how far from the middle the halves lie [m].
 
     Returns:
         By half its points, #P by 3 [m].
     """
+    meshes = meshed.meshes
     rows: dict[str, list[tuple[IntArray, FloatArray]]] = {name: [] for name in hood}
-    for (name, other), (own, its) in _joins(welds):
+    for (name, other), (own, its) in _joins(meshed.welds):
         if name in hood and other in placed and other not in hood:
             rows[name].append((own, placed[other][its]))
     found = {}
