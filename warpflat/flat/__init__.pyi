@@ -128,6 +128,7 @@ from .surface.border_seams import surface_seams as surface_seams
 from .surface.closest import nearest_on_triangles as nearest_on_triangles
 from .surface.connectivity import border_loops as border_loops
 from .surface.connectivity import border_of as border_of
+from .surface.connectivity import chain_lines as chain_lines
 from .surface.connectivity import components as components
 from .surface.connectivity import euler_characteristic as euler_characteristic
 from .surface.connectivity import join_labels as join_labels

@@ -20,6 +20,7 @@ __all__ = [
     "ON",
     "ON_EDGE",
     "Place",
+    "added",
     "backwards",
     "beside",
     "bezier",
@@ -221,6 +222,11 @@ def redrawn(pattern: Pattern, name: str, draw: Callable[[Piece], Piece | Iterabl
     """Return a pattern with what `draw` makes of a piece in every size: others in its place, or new ones."""
     made = [draw(piece) for piece in in_sizes(pattern, name)]
     return with_pieces(pattern, (each for row in made for each in ((row,) if isinstance(row, Piece) else row)))
+
+
+def added(pattern: Pattern, draw: Callable[[Piece], Piece | Iterable[Piece]]) -> Pattern:
+    """Return a pattern with new pieces in every size: `draw` gets a piece of that size and of the shell's cloth."""
+    return redrawn(pattern, pattern.pieces[pattern.sample][0].name, draw)
 
 
 def changed(pattern: Pattern, place: Place, change: Callable[[Piece, Edge], Sequence[Edge]]) -> Pattern:

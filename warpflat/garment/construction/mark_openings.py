@@ -12,6 +12,7 @@ from warpflat.core import FloatArray, InputError, find_unused_name, part_between
 from warpflat.garment.construction.button_stand import bust_depth, button_depths, with_button_stand, with_wrap
 from warpflat.garment.construction.edges import (
     ON,
+    added,
     changed,
     direction,
     downwards,
@@ -254,9 +255,10 @@ def _with_wrap(pattern: Pattern, seam: Seam, opening: Opening) -> Pattern:
     pattern = with_pieces(pattern, wrapped)
     if not opening.tie or any(piece.name == "tie" for piece in pattern.pieces[pattern.sample]):
         return pattern
-    like = pattern.pieces[pattern.sample][0]
-    tie = folded_strip("tie", like, opening.tie, TIE_WIDTH, role="tie", quantity=2, grain=(0.2, 0.5))
-    return with_pieces(pattern, [replace(tie, size=size) for size in pattern.pieces])
+    return added(
+        pattern,
+        lambda like: folded_strip("tie", like, opening.tie, TIE_WIDTH, role="tie", quantity=2, grain=(0.2, 0.5)),
+    )
 
 
 def _keyhole(piece: Piece, opening: Opening) -> Piece:

@@ -32,7 +32,7 @@ from warpflat.garment.construction.edges import (
     up_and_across,
     with_pieces,
 )
-from warpflat.garment.construction.facings import INNER, centre_notch, sewn_alike, strip_along, strip_piece
+from warpflat.garment.construction.facings import INNER, centre_notch, sewn_alike, sewn_inside, strip_along, strip_piece
 from warpflat.garment.construction.free_edges import free_chains
 from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
 
@@ -109,7 +109,7 @@ def with_shaped_waistband(
 
         def banded(piece: Piece, edge: str = edge, title: str = title) -> tuple[Piece, Piece]:
             strip = strip_along(piece, [edge], width)
-            band = [replace(part, kind="seam", allowance=None) if part.name == INNER else part for part in strip]
+            band = sewn_inside(strip)
             middle = np.concatenate([part.points for part in band]).mean(axis=0)
             # Twice as often as its piece: the outside and its facing.
             return without_strip(piece, strip, f"{edge} seam"), strip_piece(

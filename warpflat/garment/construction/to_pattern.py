@@ -41,6 +41,7 @@ from warpflat.garment.construction.closed_cuts import CLOSED, are_closed, close_
 from warpflat.garment.construction.darts import pleat_depths
 from warpflat.garment.construction.ease import measure_ease
 from warpflat.garment.construction.edge_rules import EdgeRules
+from warpflat.garment.construction.edges import lengths_of, with_pieces
 from warpflat.garment.construction.equal_pieces import draw_equal_pieces_once
 from warpflat.garment.construction.facings import STAND, Stand
 from warpflat.garment.construction.finishing import finish_edges, hem_rises
@@ -201,7 +202,16 @@ def pattern_of_garment(
         seams.append(seam)
     pattern = replace(pattern, seams=tuple(seams))
     if sample.as_cut is not None:
-        pattern = _through_vertices(pattern)
+        # What was cut is as long as the curves through the vertices of its edges, not as their chords.
+        curved = []
+        for piece in pattern:
+            lines = [edge.points if edge.kind == "fold" else curve_through(edge.points) for edge in piece.edges]
+            edges = [
+                edge if len(points) == len(edge.points) else replace(edge, points=points, vertices=None)
+                for edge, points in zip(piece.edges, lines, strict=True)
+            ]
+            curved.append(replace(piece, edges=edges))
+        pattern = with_pieces(pattern, curved)
     if laid:
         with optional_step(_NO_DRAWING, is_needed=False):
             worn = describe_worn(laid, pattern.sample, rises, pattern.pieces[pattern.sample])
@@ -234,7 +244,16 @@ def _drawn_of_meshes(sample: Garment, name: str, rules: EdgeRules, *, twice: boo
     # Where a side was cut longer than the other, as on a band that is stretched, it is eased in.
     as_laid = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased}
     stretched = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased and np.any(pair.ratio != 1.0)}
-    seams = [replace(_eased(seam, pattern, stretched), as_laid=_pieces_of(seam) in as_laid) for seam in pattern.seams]
+    seams = list[Seam]()
+    for seam in pattern.seams:
+        joined = frozenset(side.piece for row in seam.sides for side in row)
+        if joined in stretched:
+            # Its longer side is the last one.
+            first, second = sorted(seam.sides, key=lambda row: sum(lengths_of(pattern, row)))
+            one, other = sum(lengths_of(pattern, first)), sum(lengths_of(pattern, second))
+            if other - one > SEAM_TOLERANCE:
+                seam = replace(seam, sides=(first, second), ease=other / one - 1.0)
+        seams.append(replace(seam, as_laid=joined in as_laid))
     drawn_for_others = twice and len(sample.pieces) > 1 and sample.parts.keys() == sample.pieces.keys()
     return _Drawn(
         pattern=replace(pattern, seams=seams), notes=notes,
@@ -318,25 +337,6 @@ def _drawn_on_forms(
     return _Drawn(pattern=pattern, notes=notes, laid=laid, unlike=unlike, placed=placed, alike="godet")
 
 
-def _pieces_of(seam: Seam) -> frozenset[str]:
-    """Return the names of the pieces that a seam joins."""
-    return frozenset(side.piece for row in seam.sides for side in row)
-
-
-def _eased(seam: Seam, pattern: Pattern, stretched: Collection[frozenset[str]]) -> Seam:
-    """Return a seam of pieces that are stretched to each other with its longer side last, eased to the other."""
-    if _pieces_of(seam) not in stretched:
-        return seam
-    first, second = sorted(
-        seam.sides,
-        key=lambda row: sum(pattern.piece(side.piece, pattern.sample).edge(side.edge).length for side in row),
-    )
-    one, other = (
-        sum(pattern.piece(side.piece, pattern.sample).edge(side.edge).length for side in row) for row in (first, second)
-    )
-    return replace(seam, sides=(first, second), ease=other / one - 1.0) if other - one > SEAM_TOLERANCE else seam
-
-
 def _form_piece(
     flat: Flattening,
     piece: FormPiece,
@@ -393,22 +393,6 @@ def _form_piece(
         ),
     )
     return replace(drawn, placement=_placement(drawn, flat))
-
-
-def _through_vertices(pattern: Pattern) -> Pattern:
-    """Return the pattern with edges that run through their vertices as curves: what was cut is as long as these, not as their chords."""
-
-    def drawn(edge: Edge) -> Edge:
-        points = edge.points if edge.kind == "fold" else curve_through(edge.points)
-        return edge if len(points) == len(edge.points) else replace(edge, points=points, vertices=None)
-
-    return replace(
-        pattern,
-        pieces={
-            size: [replace(piece, edges=[drawn(edge) for edge in piece.edges]) for piece in row]
-            for size, row in pattern.pieces.items()
-        },
-    )
 
 
 def _placement(piece: Piece, flat: Flattening) -> FloatArray | None:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core import require_writable
 from warpflat.flat import vertex_normals
 from warpflat.pattern import (
     begin_stage,
@@ -40,7 +39,6 @@ def write_mannequin_usd(mannequin: Mannequin, path: str | os.PathLike[str]) -> N
     """
     from pxr import Gf, Kind, Usd, UsdGeom, Vt
 
-    require_writable(path)
     with usd_errors(path):
         stage = Usd.Stage.CreateInMemory()
         begin_stage(stage)
