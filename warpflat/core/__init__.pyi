@@ -111,4 +111,5 @@ from .usd_process import UNREADABLE as UNREADABLE
 from .usd_process import read_apart as read_apart
 from .vectors import laid_upon as laid_upon
 from .vectors import reflected as reflected
+from .vectors import turned_left as turned_left
 from .vectors import unit as unit

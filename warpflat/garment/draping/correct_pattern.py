@@ -26,6 +26,8 @@ from warpflat.core import (
     factor_symmetric,
     polyline_length,
     short_repr,
+    turned_left,
+    unit,
     weighted_percentiles,
 )
 from warpflat.flat import Fabric, Flattening, border_edges, corner_triangles
@@ -94,9 +96,8 @@ class Correction:
         along = old.flat[edges[:, 1]] - old.flat[edges[:, 0]]
         outwards = np.zeros_like(old.flat)
         for end in range(2):
-            np.add.at(outwards, edges[:, end], np.column_stack([along[:, 1], -along[:, 0]]))
-        length = np.linalg.norm(outwards, axis=1, keepdims=True)
-        across = np.einsum("ij,ij->i", new.flat - old.flat, outwards / np.maximum(length, 1e-30))
+            np.add.at(outwards, edges[:, end], -turned_left(along))
+        across = np.einsum("ij,ij->i", new.flat - old.flat, unit(outwards))
         return {name: across[rows] for name, rows in old.piece_vertices.items()}
 
     def edges(self, garment: Garment | Flattening) -> dict[str, dict[str, float]]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from warpflat.core import BoolArray, FloatArray, InputError, IntArray, factor_symmetric, polyline_length
+from warpflat.core import BoolArray, FloatArray, InputError, IntArray, factor_symmetric, polyline_length, unit
 from warpflat.flat import border_edges
 from warpflat.garment.draping.openings import Opening
 from warpflat.garment.draping.sew_around import AsRigid
@@ -291,7 +291,7 @@ def _rings(
             # From the edge of the neck along the shoulder.
             reach += openings[highest].length / (2.0 * np.pi) if not hooded else 0.0
             beyond = max(0.0, reach - float(np.linalg.norm(line[1] - line[0])))
-            out = (line[2] - line[1]) / np.linalg.norm(line[2] - line[1])
+            out = unit(line[2] - line[1])
             centre = line[1] + beyond * out
             value, looks = (
                 far[named.index("hem") if "hem" in named else named.index(name.replace("arm", "leg"))] - far[highest],
@@ -311,8 +311,7 @@ def _rings(
             centre = middle * [1.0, 0.0, 1.0] + (high - (0.0 if name == "waist" else reach)) * _UP
         else:
             continue
-        u = np.cross(out, ahead if abs(out[2]) < 0.9 else _UP)
-        u /= np.linalg.norm(u)
+        u = unit(np.cross(out, ahead if abs(out[2]) < 0.9 else _UP))
         # With the cloth on its left a border runs clockwise about the way out of it.
         axes = radius * np.array([u, -handed * np.cross(out, u)])
         step = np.asarray(graph[each.vertices, np.roll(each.vertices, -1)])

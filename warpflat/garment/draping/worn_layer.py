@@ -13,7 +13,7 @@ import numpy as np
 from shapely import Point, Polygon, contains_xy
 from shapely.ops import nearest_points
 
-from warpflat.core import FloatArray, nearest_on_polyline
+from warpflat.core import FloatArray, nearest_on_polyline, segment_lengths, unit
 from warpflat.pattern import MIRRORED, Edge, Piece, Seam, SeamSide, hole_edges, turn_over
 
 __all__ = ["Button", "closures", "in_one_layer", "right_side_out", "turned_down"]
@@ -134,7 +134,7 @@ def _cut_off_corners(
 
 def _cut_at(piece: Piece, line: FloatArray, sewn: Collection[str]) -> Piece:
     """Return the part of a piece on that side of a straight line on which more of its outline is sewn."""
-    along = (line[-1] - line[0]) / np.linalg.norm(line[-1] - line[0])
+    along = unit(line[-1] - line[0])
     across = np.array([-along[1], along[0]])
 
     def off(points: FloatArray) -> FloatArray:
@@ -146,7 +146,7 @@ def _cut_at(piece: Piece, line: FloatArray, sewn: Collection[str]) -> Piece:
     for edge in piece.edges:
         if edge.name in sewn:
             middle = 0.5 * (edge.points[1:] + edge.points[:-1])
-            length = np.linalg.norm(np.diff(edge.points, axis=0), axis=1)
+            length = segment_lengths(edge.points)
             for k, side in enumerate((1.0, -1.0)):
                 lengths[k] += float(length[side * off(middle) > 0.0].sum())
     side = 1.0 if lengths[0] >= lengths[1] else -1.0
