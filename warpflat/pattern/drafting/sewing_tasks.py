@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from importlib import resources
 from typing import Any
 
-from warpflat.core import other_side, polyline_length, read_toml, without_side
+from warpflat.core import line_name, other_side, polyline_length, read_toml, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
@@ -135,7 +135,7 @@ class SewingTasks:
         several = {piece for piece, _ in places if len({widths[each] for each in places if each[0] == piece}) > 1}
         alike = {width for place, width in widths.items() if place[0] in several}
         for piece, edge in places:
-            row, name = widths[piece, edge], translate_name(without_side(edge).rstrip(" 0123456789"))
+            row, name = widths[piece, edge], translate_name(line_name(edge))
             if technique != "hem":
                 row = name
             elif row in alike:
@@ -222,10 +222,6 @@ class SewingTasks:
 
     def _turned_over(self, seam: Seam) -> list[Place]:
         """Return what no seam takes beside a collar: ends of facings, which are turned over its ends, and of button stands."""
-
-        def stem(edge: str) -> str:
-            return without_side(edge).rstrip(" 0123456789")
-
         taken = {side.place for each in self.seams for side in each.stretches}
         shell = [side for side in seam.stretches if self.pieces[side.piece].role == "shell"]
         facings = {
@@ -235,12 +231,12 @@ class SewingTasks:
             for side in each.stretches
             if self.pieces[side.piece].role == "facing"
         }
-        along = {stem(side.edge) for side in shell}
+        along = {line_name(side.edge) for side in shell}
         return [
             (piece, edge)
             for piece in [*sorted(facings), *(pieces_of((side.piece, "") for side in shell) if facings else ())]
             for edge in self.order[piece]
-            if (piece, edge) not in taken and stem(edge) in along
+            if (piece, edge) not in taken and line_name(edge) in along
         ]
 
     def _finish(self, garment: DraftedGarment) -> None:
@@ -381,7 +377,7 @@ class SewingTasks:
                 (piece.name, edge.name)
                 for piece in self.pieces.values()
                 for edge in piece.edges
-                if without_side(edge.name).rstrip(" 0123456789") == elastic.edge
+                if line_name(edge.name) == elastic.edge
             ]
             cased = take([place for place in along if free.get(place) == "hem"])
             values = {
