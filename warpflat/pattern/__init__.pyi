@@ -88,6 +88,7 @@ from .export.ledger_picture import write_ledger_picture as write_ledger_picture
 from .export.letters import all_letters as all_letters
 from .export.letters import note_on_names as note_on_names
 from .export.obj import write_obj as write_obj
+from .export.packing import rows_on_table as rows_on_table
 from .export.pattern_json import read_pattern_json as read_pattern_json
 from .export.pattern_json import write_pattern_json as write_pattern_json
 from .export.pdf import too_many_sheets as too_many_sheets
@@ -115,7 +116,6 @@ from .export.usd_prims import define_mesh as define_mesh
 from .export.usd_prims import export_stage as export_stage
 from .export.usd_prims import last_values_as_defaults as last_values_as_defaults
 from .export.usd_prims import part_path as part_path
-from .export.usd_prims import rows_on_table as rows_on_table
 from .export.usd_prims import set_face_map as set_face_map
 from .export.usd_prims import set_points as set_points
 from .export.usd_prims import usd_errors as usd_errors

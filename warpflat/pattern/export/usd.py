@@ -20,6 +20,7 @@ from warpflat.core import FloatArray, InputError, atomic_path
 from warpflat.flat import Surface, triangulate, vertex_normals
 from warpflat.pattern.export.colours import VertexColours, energy_scale
 from warpflat.pattern.export.geometry import Polylines, face_areas, polylines_of
+from warpflat.pattern.export.packing import rows_on_table
 from warpflat.pattern.export.usd_prims import (
     FIRST_FRAME,
     MeshSamples,
@@ -35,7 +36,6 @@ from warpflat.pattern.export.usd_prims import (
     last_values_as_defaults,
     part_path,
     require_usd,
-    rows_on_table,
     set_face_map,
     set_points,
     usd_errors,

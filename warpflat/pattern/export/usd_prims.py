@@ -8,7 +8,6 @@ before: where the lengths would agree, the last point is stored twice. No face u
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -38,7 +37,6 @@ __all__ = [
     "last_values_as_defaults",
     "part_path",
     "require_usd",
-    "rows_on_table",
     "set_face_map",
     "set_points",
     "usd_errors",
@@ -454,33 +452,3 @@ def add_light(stage: Any) -> None:
     key.CreateExposureAttr(0.0)
     key.CreateAngleAttr(2.0)
     UsdGeom.Xformable(key).AddRotateXYZOp().Set(Gf.Vec3f(-35.0, -30.0, 0.0))
-
-
-def rows_on_table(sizes: FloatArray, gap: float) -> FloatArray:
-    """Return the lower left corner of each of several boxes, laid out in rows, so many that the whole is near to 16 by 9.
-
-    Args:
-        sizes: #B by 2 [m].
-        gap: between boxes and between rows [m].
-    """
-    whole = float((sizes[:, 0] + gap).sum())
-    layouts = [_rows(sizes, gap, max(1.05 * whole / rows, float(sizes[:, 0].max()))) for rows in range(1, 5)]
-
-    def unlikeness(corners: FloatArray) -> float:
-        wide, high = (corners + sizes).max(axis=0)
-        return abs(math.log(max(wide, 1e-9) / max(high, 1e-9) * 9.0 / 16.0))
-
-    return min(layouts, key=unlikeness)
-
-
-def _rows(sizes: FloatArray, gap: float, width: float) -> FloatArray:
-    """Return the lower left corners of boxes in rows of at most this width [m]."""
-    corners = np.zeros_like(sizes)
-    x = y = deep = 0.0
-    for number, (wide, high) in enumerate(sizes.tolist()):
-        if x > 0.0 and x + wide > width:
-            x, y, deep = 0.0, y - deep - gap, 0.0
-        corners[number] = x, y - high
-        x, deep = x + wide + gap, max(deep, high)
-    corners[:, 1] -= corners[:, 1].min()
-    return corners
