@@ -139,7 +139,11 @@ def worn_at(worn: Mapping[str, tuple[FloatArray, IntArray]], seams: Sequence[Sea
     group = {name: {name} for name in side}
     for seam in seams:
         a, b = (chain[0].piece for chain in seam.sides)
-        if a in group and b in group and side[a] == side[b] and _turned_apart(vector[a], vector[b]):
+        if a not in group or b not in group or side[a] != side[b]:
+            continue
+        # They face more away from each other than alike.
+        one, other = vector[a].sum(axis=0), vector[b].sum(axis=0)
+        if float(one @ other) < 0.5 * float(np.linalg.norm(one) * np.linalg.norm(other)):
             both = group[a] | group[b]
             group |= dict.fromkeys(both, both)
     at = {}
@@ -161,9 +165,3 @@ def worn_at(worn: Mapping[str, tuple[FloatArray, IntArray]], seams: Sequence[Sea
         ):
             at[name] = f"{which} arm"
     return at
-
-
-def _turned_apart(one: FloatArray, other: FloatArray) -> bool:
-    """Return whether two pieces face more away from each other than alike."""
-    a, b = one.sum(axis=0), other.sum(axis=0)
-    return float(a @ b) < 0.5 * float(np.linalg.norm(a) * np.linalg.norm(b))

@@ -309,8 +309,14 @@ def _with_strip(pattern: Pattern, wish: Finishing, chain: FreeChain, count: int,
 
     pattern = added(pattern, strip)
     size_notches: dict[str, tuple[float, ...]] = {}
-    sided = any(without_side(side.edge) != side.edge for side in chain.sides)
-    notches = None if sided else _centres(pattern, chain)
+    notches: tuple[float, ...] | None = None
+    if all(without_side(side.edge) == side.edge for side in chain.sides):
+        # In the middles of the edges that cross a centre line; their joints are notched anyway. A piece that is printed half has the notch
+        # on its fold, and the strip has one for it.
+        along = np.array(lengths_of(pattern, chain.sides))
+        middles = ((np.cumsum(along) - 0.5 * along) / along.sum()).tolist()
+        whole_pieces = [centre_notch(pattern.piece(side.piece, pattern.sample)) is not None for side in chain.sides]
+        notches = tuple(at for at, crosses in zip(middles, whole_pieces, strict=True) if crosses)
     if wish.pleat:
         # Lengths of the strip and of its edge fit each other from pleat to pleat alone.
         notches = ()
@@ -333,18 +339,3 @@ def _with_strip(pattern: Pattern, wish: Finishing, chain: FreeChain, count: int,
 def _pleat_count(wish: Finishing, length: float) -> int:
     """Return how many pleats a panel of a strip of that length [m] is laid in."""
     return max(1, round(length / wish.share / wish.pleat))
-
-
-def _centres(pattern: Pattern, chain: FreeChain) -> tuple[float, ...]:
-    """Return the shares of a chain at the middles of the edges that cross a centre line; its joints are notched anyway.
-
-    A piece that is printed half has the notch on its fold, and the strip has one for it.
-    """
-    lengths = lengths_of(pattern, chain.sides)
-    ends = np.cumsum(lengths)
-    whole = [centre_notch(pattern.piece(side.piece, pattern.sample)) is not None for side in chain.sides]
-    return tuple(
-        float((end - 0.5 * length) / ends[-1])
-        for end, length, crosses in zip(ends, lengths, whole, strict=True)
-        if crosses
-    )

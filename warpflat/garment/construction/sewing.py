@@ -222,8 +222,12 @@ def sew(
     unsewn = np.concatenate([piece.positions for piece in pieces.values()])
     equations, kinds, oriented = _constraint_equations(joined, unsewn, seams, constraints, folds)
     start = np.concatenate([_straighten_fold(piece, folds.get(name)) for name, piece in pieces.items()])
-    # Begin with the offsets that are known of the same equations.
-    held, known = list(_held(equations, kinds)), offsets or {}
+    # By kind and name of every group the numbers of those of its equations that have offsets; begin with those that are known.
+    lasting, known = (equations.soft == 0) | (equations.share > 0), offsets or {}
+    held = [
+        ((kind, name), np.flatnonzero(lasting & (equations.group == number)).astype(np.int32))
+        for number, (name, kind) in enumerate(kinds)
+    ]
     begun = [(numbers, known[key]) for key, numbers in held if len(known.get(key, ())) == len(numbers)]
     network = joined.network(folds, equations, options, begun)
     # A piece with a guided line needs nothing else to hold it: the line cannot turn.
@@ -283,15 +287,6 @@ def sew(
         seconds=seconds,
         offsets=offsets,
     )
-
-
-def _held(
-    equations: ConstraintEquations, kinds: Sequence[tuple[str, str]]
-) -> Iterator[tuple[tuple[str, str], IntArray]]:
-    """Yield kind and name of every group, and the numbers of those of its equations that have offsets."""
-    lasting = (equations.soft == 0) | (equations.share > 0)
-    for number, (name, kind) in enumerate(kinds):
-        yield (kind, name), np.flatnonzero(lasting & (equations.group == number)).astype(np.int32)
 
 
 def _constraint_equations(
