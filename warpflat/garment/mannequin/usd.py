@@ -14,7 +14,6 @@ from warpflat.pattern import (
     define_group,
     define_mesh,
     export_stage,
-    set_points,
     usd_errors,
     valid_name,
 )
@@ -66,19 +65,17 @@ def write_mannequin_usd(mannequin: Mannequin, path: str | os.PathLike[str]) -> N
 
 def _mesh(stage: Any, mannequin: Mannequin, part: str, *, on_body: bool) -> None:
     """Add the body, or the tube around both legs as a guide that renderers leave out."""
-    from pxr import Gf, UsdGeom, Vt
+    from pxr import UsdGeom, Vt
 
     layout = mannequin.layout
     chosen = layout.on_body == on_body
     corners, face_brick = layout.faces[chosen], layout.face_brick[chosen]
-    mesh = define_mesh(stage, f"/World/mannequin/{part}", corners)
+    mesh = define_mesh(stage, f"/World/mannequin/{part}", corners, mannequin.vertices, _CLOTH)
     if not on_body:
         mesh.CreatePurposeAttr(UsdGeom.Tokens.guide)
-    set_points(mesh, mannequin.vertices)
     normals = vertex_normals(mannequin.vertices, corners).astype(np.float32)
     mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(normals))
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
-    mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set(Vt.Vec3fArray([Gf.Vec3f(*_CLOTH)]))
     taken: set[str] = set()
     for index, name in enumerate(layout.bricks):
         faces = np.flatnonzero(face_brick == index).astype(np.int32)

@@ -13,7 +13,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, IntArray
 from warpflat.flat import triangulate, vertex_normals
-from warpflat.pattern.export.usd_prims import define_mesh, export_stage, set_points, valid_name
+from warpflat.pattern.export.usd_prims import define_mesh, export_stage, valid_name
 
 __all__ = ["write_sewn_usd"]
 
@@ -52,8 +52,7 @@ def write_sewn_usd(
     root = UsdGeom.Xform.Define(stage, "/Root").GetPrim()
     Usd.ModelAPI(root).SetKind(Kind.Tokens.component)
     stage.SetDefaultPrim(root)
-    mesh = define_mesh(stage, "/Root/garment", faces)
-    set_points(mesh, points)
+    mesh = define_mesh(stage, "/Root/garment", faces, points)
     triangles, _ = triangulate(faces)
     normals = vertex_normals(points, triangles).astype(np.float32)
     mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(normals))
