@@ -13,6 +13,7 @@ from warpflat.pattern import (
     bounding_box,
     define_group,
     define_mesh,
+    define_subsets,
     export_stage,
     usd_errors,
     valid_name,
@@ -76,13 +77,5 @@ def _mesh(stage: Any, mannequin: Mannequin, part: str, *, on_body: bool) -> None
     normals = vertex_normals(mannequin.vertices, corners).astype(np.float32)
     mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(normals))
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
-    taken: set[str] = set()
-    for index, name in enumerate(layout.bricks):
-        faces = np.flatnonzero(face_brick == index).astype(np.int32)
-        if not len(faces):
-            continue
-        subset = UsdGeom.Subset.CreateGeomSubset(
-            mesh, valid_name(name, taken), UsdGeom.Tokens.face, Vt.IntArray.FromNumpy(faces), "brick",
-            UsdGeom.Tokens.partition,
-        )  # fmt: skip
-        subset.GetPrim().SetDisplayName(name)
+    bricks = {name: np.flatnonzero(face_brick == index) for index, name in enumerate(layout.bricks)}
+    define_subsets(mesh, "brick", {name: faces for name, faces in bricks.items() if len(faces)})

@@ -33,6 +33,7 @@ __all__ = [
     "bounding_box",
     "define_group",
     "define_mesh",
+    "define_subsets",
     "export_stage",
     "last_values_as_defaults",
     "part_path",
@@ -129,9 +130,9 @@ def define_group(stage: Any, path: str, *, label: str | None = None, kind: str |
     return prim
 
 
-def begin_stage(stage: Any, *, is_film: bool = False) -> None:
-    """Set a stage to metres and Y up, and define `/World`, its default prim; a film begins at frame 1."""
-    from pxr import Kind, UsdGeom
+def begin_stage(stage: Any, *, root: str = "/World", kind: str = "assembly", is_film: bool = False) -> None:
+    """Set a stage to metres and Y up, and define its default prim; a film begins at frame 1."""
+    from pxr import UsdGeom
 
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
@@ -140,7 +141,7 @@ def begin_stage(stage: Any, *, is_film: bool = False) -> None:
         stage.SetFramesPerSecond(_RATE)
         stage.SetStartTimeCode(FIRST_FRAME)
         stage.SetEndTimeCode(FIRST_FRAME)
-    stage.SetDefaultPrim(define_group(stage, "/World", kind=Kind.Tokens.assembly))
+    stage.SetDefaultPrim(define_group(stage, root, kind=kind))
 
 
 def define_mesh(
@@ -187,6 +188,19 @@ def set_points(mesh: Any, points: ArrayLike, time: Any = None) -> None:
     time = Usd.TimeCode.Default() if time is None else time
     mesh.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(stored), time)
     mesh.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(bounding_box(stored)), time)
+
+
+def define_subsets(mesh: Any, family: str, faces: Mapping[str, NDArray[Any]]) -> None:
+    """Define GeomSubsets that part a mesh, with the names of their faces (#S each) as display names."""
+    from pxr import UsdGeom, Vt
+
+    taken = set[str]()
+    for name, rows in faces.items():
+        indices = Vt.IntArray.FromNumpy(rows.astype(np.int32))
+        subset = UsdGeom.Subset.CreateGeomSubset(
+            mesh, valid_name(name, taken), UsdGeom.Tokens.face, indices, family, UsdGeom.Tokens.partition
+        )
+        subset.GetPrim().SetDisplayName(name)
 
 
 def last_values_as_defaults(stage: Any, prims: Iterable[Any]) -> None:
