@@ -112,7 +112,7 @@ def test_halves_and_pairs_are_made_whole():
         "e2 mirrored",
         "e1 mirrored",
     ]
-    texts = {s.name: tuple(f"{x} {x.reversed}" for chain in s.sides for x in chain) for s in seams}
+    texts = {s.name: tuple(f"{x} {x.reversed}" for x in s.stretches) for s in seams}
     assert texts == {
         "side": ("front.e2 False", "side.e4 True"),
         "back": ("side.e2 False", "side mirrored.e2 True"),
@@ -472,6 +472,6 @@ def test_a_cuff_is_sewn_to_both_sleeves():
     seams = [seam("wrist", "sleeve.e1", "cuff.e3"), seam("over the arm", "sleeve.e3", "yoke.e1"), other]
     whole, sewn, _ = whole_pieces(pieces, seams)
     assert set(whole) == {"sleeve", "sleeve mirrored", "cuff", "cuff mirrored", "yoke"}
-    joined = [{side.piece for chain in each.sides for side in chain} for each in sewn]
+    joined = [{side.piece for side in each.stretches} for each in sewn]
     assert {"sleeve mirrored", "cuff mirrored"} in joined
     assert {"sleeve mirrored", "yoke"} in joined

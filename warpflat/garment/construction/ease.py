@@ -181,7 +181,7 @@ def _longer_side(seam: Seam, longer: str | None) -> int:
             f"seam {seam.name!r}: {longer!r} is not one of its sides; {nearest(longer, named[0] | named[1])}"
         )
     if len(found) == 2:
-        edges = {str(side) for sides in seam.sides for side in sides}
+        edges = {str(side) for side in seam.stretches}
         raise InputError(f"seam {seam.name!r}: both sides are of {longer!r}; name the edge: {', '.join(sorted(edges))}")
     return found[0]
 

@@ -267,4 +267,4 @@ def copies_sewn(pattern: Pattern, name: str, piece: str, *edges: str) -> Pattern
 
 def sewn_places(pattern: Pattern) -> set[Place]:
     """Return the edges that seams join."""
-    return {(side.piece, side.edge) for seam in pattern.seams for row in seam.sides for side in row}
+    return {side.place for seam in pattern.seams for side in seam.stretches}

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, nearest, other_side, without_side
+from warpflat.core import FloatArray, InputError, line_name, nearest, other_side, without_side
 from warpflat.garment.construction.button_stand import buttonhole
 from warpflat.garment.construction.collars import Collar, with_collar, with_hood
 from warpflat.garment.construction.edges import (
@@ -225,7 +225,7 @@ def _opened_up(pattern: Pattern, called: str, *, sewn_there: bool = True) -> tup
         if (piece.name, edge.name) not in taken
         and (edge.kind == "seam" or (edge.kind == "hem" and piece.role == "shell"))
     }
-    names = {edge: without_side(edge).rstrip(" 0123456789") for _, edge in free}
+    names = {edge: line_name(edge) for _, edge in free}
     places = [place for place in free if names[place[1]] == called]
     if not places:
         raise InputError(f"no free edge {called!r}; {nearest(called, set(names.values()))}")

@@ -33,7 +33,7 @@ def with_flies(pattern: Pattern) -> Pattern:
     """
     for seam in pattern.seams:
         zips = [each for each in seam.openings if each.kind == "zip" and each.style == "lapped" and not each.begin]
-        sides = [side for row in seam.sides for side in row]
+        sides = seam.stretches
         in_front = all("front" in re.split("[ _]", side.piece) for side in sides)
         # Waistbands that are sewn to the edge above.
         above = _above(pattern.piece(sides[0].piece, pattern.sample), sides[0].edge)
@@ -41,7 +41,7 @@ def with_flies(pattern: Pattern) -> Pattern:
             other.piece
             for joint in pattern.seams
             for own, others in (joint.sides, joint.sides[::-1])
-            if any((each.piece, each.edge) == (sides[0].piece, above) for each in own)
+            if any(each.place == (sides[0].piece, above) for each in own)
             for other in others
             if pattern.piece(other.piece, pattern.sample).role == "waistband"
         ]

@@ -88,7 +88,7 @@ def add_lining(pattern: Pattern, cloth: str) -> Pattern:
     seams = list(pattern.seams)
     for seam in pattern.seams:
         first, second = (tuple(replace(side, piece=names.get(side.piece, "")) for side in row) for row in seam.sides)
-        if all((side.piece, side.edge) in edges for side in (*first, *second)):
+        if all(side.place in edges for side in (*first, *second)):
             seams.append(replace(seam, name=f"{seam.name} of the lining", sides=(first, second), notches=None))
     whole = replace(whole, seams=seams)
     for name, facings in faced.items():

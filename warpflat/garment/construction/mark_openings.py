@@ -104,7 +104,7 @@ def _with_opening(pattern: Pattern, opening: Opening, part: OpeningPart, parts: 
         return _with_buttons(pattern, seam, opening, parts)
     if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0:
         raise InputError(f"a {opening.kind} begins at the lower end of a seam between two edges")
-    for side in [side for row in seam.sides for side in row if not side.mirrored]:
+    for side in [side for side in seam.stretches if not side.mirrored]:
         names = {edge.name for edge in pattern.piece(side.piece, pattern.sample).edges}
         if names & {f"{side.edge} {kind}" for kind in ("slit", "vent", "godet")}:
             raise InputError(f"the lower end of {seam.name!r} is open already")
@@ -115,7 +115,7 @@ def _with_opening(pattern: Pattern, opening: Opening, part: OpeningPart, parts: 
                     f"a {opening.kind} of {1e3 * opening.length:.0f} mm leaves nothing of the seam {seam.name!r}, "
                     f"{1e3 * whole:.0f} mm long; make it shorter, or leave the seam out of the form"
                 )
-        pattern = changed(pattern, (side.piece, side.edge), lambda piece, edge: _free_end(piece, edge, opening))
+        pattern = changed(pattern, side.place, lambda piece, edge: _free_end(piece, edge, opening))
     return _with_godet(pattern, seam, opening) if opening.kind == "godet" else pattern
 
 
@@ -143,7 +143,7 @@ def _with_zip(pattern: Pattern, seam: Seam, opening: Opening, parts: _Parts, *, 
     """Return a pattern with the line of a zip beside the edges of a seam, and a notch where it ends, if it does within the seam."""
     import shapely
 
-    for side in [side for row in seam.sides for side in row if not side.mirrored]:
+    for side in [side for side in seam.stretches if not side.mirrored]:
 
         def beside_edge(piece: Piece, edge: str = side.edge) -> Piece:
             row = parts[piece.size]
@@ -183,7 +183,7 @@ def _with_buttons(pattern: Pattern, seam: Seam, opening: Opening, parts: _Parts)
     """Return a pattern with a button stand on both sides of a seam, which is sewn only below it."""
     if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0 or opening.buttons is None:
         raise InputError("buttons begin at the upper end of a seam between two edges")
-    places = list(dict.fromkeys((side.piece, side.edge) for row in seam.sides for side in row))
+    places = list(dict.fromkeys(side.place for side in seam.stretches))
     name, edge = places[0]
     depths = dict[str, FloatArray]()
     # The sample size first: the others have as many buttons.
@@ -249,7 +249,7 @@ def _with_godet(pattern: Pattern, seam: Seam, opening: Opening) -> Pattern:
 
 def _with_wrap(pattern: Pattern, seam: Seam, opening: Opening) -> Pattern:
     """Return a pattern whose halves run beyond a centre line, each over the other; they are not sewn there, but tied."""
-    edges = {side.piece: side.edge for row in seam.sides for side in row}
+    edges = {side.piece: side.edge for side in seam.stretches}
     pattern = replace(pattern, seams=[each for each in pattern.seams if each.name != seam.name])
     wrapped = [with_wrap(piece, edge, opening) for name, edge in edges.items() for piece in in_sizes(pattern, name)]
     pattern = with_pieces(pattern, wrapped)

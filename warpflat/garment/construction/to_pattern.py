@@ -246,7 +246,7 @@ def _drawn_of_meshes(sample: Garment, name: str, rules: EdgeRules, *, twice: boo
     stretched = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased and np.any(pair.ratio != 1.0)}
     seams = list[Seam]()
     for seam in pattern.seams:
-        joined = frozenset(side.piece for row in seam.sides for side in row)
+        joined = frozenset(side.piece for side in seam.stretches)
         if joined in stretched:
             # Its longer side is the last one.
             first, second = sorted(seam.sides, key=lambda row: sum(lengths_of(pattern, row)))
@@ -325,7 +325,7 @@ def _drawn_on_forms(
     cut = one_sided(sample.openings)
     rows = zip(sample.openings, placed[next(iter(garments))], strict=True)
     parted = {part.seam for opening, parts in rows for part in parts if opening in cut}
-    unlike = {side.piece for seam in seams if seam.name in parted for row in seam.sides for side in row}
+    unlike = {side.piece for seam in seams if seam.name in parted for side in seam.stretches}
     slanted = {wish.edge for wish in sample.finishing if wish.is_one_sided}
     unlike |= {piece.name for piece in pieces[next(iter(pieces))] for edge in piece.edges if edge.name in slanted}
     notes = tuple(
@@ -687,7 +687,7 @@ def _mesh_seams(
     from scipy.spatial import cKDTree
 
     seams: list[Seam] = [*named]
-    done = {(side.piece, side.edge) for seam in named for row in seam.sides for side in row}
+    done = {side.place for seam in named for side in seam.stretches}
     rows: list[tuple[tuple[SeamSide, ...], FloatArray]] = []
     for result, piece in zip(results, pieces, strict=True):
         vertices, count = result.network.surface.vertices, len(piece.edges)
@@ -720,7 +720,7 @@ def _mesh_seams(
     for (first, curve), (second, other) in sorted(
         pairs, key=lambda pair: (len(pair[0][0]) + len(pair[1][0]), order[pair[0][0]])
     ):
-        taken = [(side.piece, side.edge) for side in (*first, *second)]
+        taken = [side.place for side in (*first, *second)]
         if len(set(taken)) < len(taken) or not done.isdisjoint(taken):
             continue
         against = not are_one(curve, other)
@@ -745,12 +745,7 @@ def _lacking_seams(garment: Garment, pattern: Pattern) -> list[tuple[Stitching, 
         for name, piece in garment.pieces.items()
         for part in (separate(piece) if piece.cuts else (piece,))
     }
-    seam_of = {
-        (side.piece, side.edge): number
-        for number, seam in enumerate(pattern.seams)
-        for row in seam.sides
-        for side in row
-    }
+    seam_of = {side.place: number for number, seam in enumerate(pattern.seams) for side in seam.stretches}
     # Each mesh edge of an outline, by its piece and its ends in the layout: the number of its seam, -1 for none; None if it is meant to
     # be in none.
     sewn: dict[tuple[str, frozenset[bytes]], int | None] = {}

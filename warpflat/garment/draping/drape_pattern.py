@@ -123,9 +123,7 @@ def drape_pattern(
             f"pattern {pattern.name!r} has no seams; name them in a file of [[seams]] and give --seams FILE"
         )
     # A garment of an impossible size comes from a file whose units are wrong.
-    sizes = {
-        name: np.ptp(np.concatenate([edge.points for edge in piece.edges]), axis=0) for name, piece in pieces.items()
-    }
+    sizes = {name: np.ptp(piece.outline, axis=0) for name, piece in pieces.items()}
     name = max(sizes, key=lambda each: float(sizes[each].max()))
     wide, high = sizes[name]
     if not _SIZES[0] <= max(wide, high) <= _SIZES[1]:
@@ -313,10 +311,8 @@ def _sew(
     cloth = sew_meshes(meshed, fabric, turned=turned)
     buttons, lines = closures(pieces), limb_lines(body)
     openings = find_openings(cloth, meshed.welds[-1] if buttons else ())
-    girth, around = (
-        polyline_length(body.line("waist"), closed=True),
-        max((each.length for each in openings), default=np.inf),
-    )
+    girth = polyline_length(body.line("waist"), closed=True)
+    around = max((each.length for each in openings), default=np.inf)
     if around < _LEAST_GIRTH * girth:
         raise InputError(
             f"the pattern goes {1e3 * around:.0f} mm around the body, whose waist has {1e3 * girth:.0f} mm: {_UNITS} Is a piece missing?"

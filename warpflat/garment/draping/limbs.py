@@ -22,13 +22,12 @@ def limb_lines(body: Mannequin) -> dict[str, FloatArray]:
     That of the head leaves through the face, as it does in a hood.
     """
     chest, neck = body.line("bust").mean(axis=0), body.line("collar").mean(axis=0)
-    ways, face = dict[str, tuple[str, str]](), neck + np.array([0.0, _FACE, 0.0])
-    for side in ("left", "right"):
-        ways |= {f"{side} arm": (f"armhole {side}", f"wrist {side}"), f"{side} leg": (f"thigh {side}", f"ankle {side}")}
+    face = neck + np.array([0.0, _FACE, 0.0])
     found = {"head": np.array([chest, neck, face, face + np.array([0.0, 0.0, _BEYOND])])}
-    for limb, ends in ways.items():
-        near, end = (body.line(line).mean(axis=0) for line in ends)
-        found[limb] = np.array([chest, near, end, end + _BEYOND * unit(end - near)])
+    for limb, ends in {"arm": ("armhole", "wrist"), "leg": ("thigh", "ankle")}.items():
+        for side in ("left", "right"):
+            near, end = (body.line(f"{line} {side}").mean(axis=0) for line in ends)
+            found[f"{side} {limb}"] = np.array([chest, near, end, end + _BEYOND * unit(end - near)])
     return found
 
 

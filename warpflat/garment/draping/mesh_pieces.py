@@ -77,7 +77,7 @@ def mesh_pieces(pieces: Mapping[str, Piece], seams: Sequence[Seam], spacing: flo
     }
     owner: dict[tuple[str, str], int] = {}
     for number, seam in enumerate(seams):
-        for side in (side for chain in seam.sides for side in chain):
+        for side in seam.stretches:
             key = side.piece, side.edge
             if key in owner:
                 raise InputError(f"edge {side} is sewn twice, in {seams[owner[key]].name!r} and {seam.name!r}")
