@@ -113,6 +113,7 @@ from .export.usd_prims import begin_stage as begin_stage
 from .export.usd_prims import bounding_box as bounding_box
 from .export.usd_prims import define_group as define_group
 from .export.usd_prims import define_mesh as define_mesh
+from .export.usd_prims import define_subsets as define_subsets
 from .export.usd_prims import export_stage as export_stage
 from .export.usd_prims import last_values_as_defaults as last_values_as_defaults
 from .export.usd_prims import part_path as part_path

@@ -293,15 +293,14 @@ class FrameWriter:
 
     def show_drafted(self, surfaces: Sequence[Surface]) -> None:
         """Show pieces that have no frames, such as collars, where they are worn: meshes of one colour below `/World/drafted`."""
-        from pxr import Gf, Kind, UsdGeom
+        from pxr import Kind
 
         taken = set[str]()
         define_group(self._stage, DRAFTED, kind=Kind.Tokens.component)
         for surface in surfaces:
-            mesh = define_mesh(self._stage, f"{DRAFTED}/{valid_name(surface.name, taken)}", surface.faces)
+            path = f"{DRAFTED}/{valid_name(surface.name, taken)}"
+            mesh = define_mesh(self._stage, path, surface.faces, surface.vertices, _DRAFTED_COLOUR)
             mesh.GetPrim().SetDisplayName(surface.name)
-            set_points(mesh, surface.vertices)
-            mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set([Gf.Vec3f(*_DRAFTED_COLOUR)])
             self._bodies.append(surface.vertices)
 
     def write(
