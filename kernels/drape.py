@@ -16,6 +16,7 @@ from .membrane_cell import Cloth, ClothLaw, cloth_law
 wp.set_module_options({"enable_backward": False})
 
 TINY = wp.constant(wp.float64(1.0e-30))
+mat32d = wp.types.matrix(shape=(3, 2), dtype=wp.float64)
 
 
 @wp.struct
@@ -79,14 +80,14 @@ class DrapedCell:
 
 
 @wp.func
-def draped_cell(position: wp.array(dtype=wp.vec3d), corner: wp.vec3i, gradient: wp.vec4d, cloth: Cloth):
+def draped_cell(position: wp.array(dtype=wp.vec3d), corner: wp.vec3i, gradient: mat32d, cloth: Cloth):
     """Return the cell with these corners; gradient: as of `evaluate_cloth`."""
     origin = position[natural(corner[0])]
     d1 = position[natural(corner[1])] - origin
     d2 = position[natural(corner[2])] - origin
     cell = DrapedCell()
-    cell.warp = d1 * gradient[0] + d2 * gradient[2]
-    cell.weft = d1 * gradient[1] + d2 * gradient[3]
+    cell.warp = d1 * gradient[1, 0] + d2 * gradient[2, 0]
+    cell.weft = d1 * gradient[1, 1] + d2 * gradient[2, 1]
     cell.length_warp = wp.max(wp.length(cell.warp), TINY)
     cell.length_weft = wp.max(wp.length(cell.weft), TINY)
     e = wp.vec2d(cell.length_warp - wp.float64(1.0), cell.length_weft - wp.float64(1.0))
@@ -98,7 +99,7 @@ def draped_cell(position: wp.array(dtype=wp.vec3d), corner: wp.vec3i, gradient: 
 def evaluate_cloth(
     position: wp.array(dtype=wp.vec3d),
     corner: wp.array(dtype=wp.vec3i),
-    gradient: wp.array(dtype=wp.vec4d),
+    gradient: wp.array(dtype=mat32d),
     area: wp.array(dtype=wp.float64),
     cloth: Cloth,
     first: int,
@@ -108,7 +109,7 @@ def evaluate_cloth(
 ):
     """Compute the membrane's energy, and its forces on the corners of each cell, minus the gradient of (flat area) psi.
 
-    position: #V [m]. corner: #C. gradient: #C, of the weight of corner 1 along warp and weft, then of corner 2 [1/m].
+    position: #V [m]. corner: #C. gradient: #C, of the weight of each corner along warp and weft [1/m].
     area: #C, flat [m2]. force: 3 #C [N]. energy: #C [J].
     """
     c = natural(wp.tid() + first)
@@ -118,11 +119,8 @@ def evaluate_cloth(
     energy[c] = law.energy * area[c]
     pull_warp = (cell.warp * (law.sigma[0] / cell.length_warp) + cell.weft * law.tau) * area[c]
     pull_weft = (cell.weft * (law.sigma[1] / cell.length_weft) + cell.warp * law.tau) * area[c]
-    f1 = -(pull_warp * g[0] + pull_weft * g[1])
-    f2 = -(pull_warp * g[2] + pull_weft * g[3])
-    force[natural(3 * c)] = -(f1 + f2)
-    force[natural(3 * c + 1)] = f1
-    force[natural(3 * c + 2)] = f2
+    for k in range(3):
+        force[natural(3 * c + k)] = -(pull_warp * g[k, 0] + pull_weft * g[k, 1])
 
 
 @wp.kernel

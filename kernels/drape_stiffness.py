@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from .drape import TINY, Contact, Motion, draped_cell, push_of_plane
+from .drape import TINY, Contact, Motion, draped_cell, mat32d, push_of_plane
 from .indices import natural
 from .membrane_cell import Cloth
 
@@ -12,21 +12,11 @@ wp.set_module_options({"enable_backward": False})
 HELD = wp.constant(wp.float64(1.0e6))
 
 
-@wp.func
-def corner_gradient(g: wp.vec4d, k: int):
-    """Return the gradient of the weight of corner k along warp and weft, by those of corners 1 and 2 [1/m]."""
-    if k == 1:
-        return wp.vec2d(g[0], g[1])
-    if k == 2:
-        return wp.vec2d(g[2], g[3])
-    return wp.vec2d(-g[0] - g[2], -g[1] - g[3])
-
-
 @wp.kernel
 def stiffen_cloth(
     position: wp.array(dtype=wp.vec3d),
     corner: wp.array(dtype=wp.vec3i),
-    gradient: wp.array(dtype=wp.vec4d),
+    gradient: wp.array(dtype=mat32d),
     area: wp.array(dtype=wp.float64),
     cloth: Cloth,
     pull: wp.float64,
@@ -70,8 +60,8 @@ def stiffen_cloth(
     for k in range(9):
         i = k / 3
         j = k % 3
-        along_i = corner_gradient(g, i)
-        along_j = corner_gradient(g, j)
+        along_i = g[i]
+        along_j = g[j]
         stiffness[natural(9 * c + k)] = (
             of_warp * (along_i[0] * along_j[0])
             + of_weft * (along_i[1] * along_j[1])

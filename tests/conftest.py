@@ -84,6 +84,16 @@ def _read_here(function: str, path: Path, **arguments: Any) -> Any:
         raise InputError(UNREADABLE) from None
 
 
+@pytest.fixture(scope="session")
+def dress() -> Any:
+    """The sample dress, drafted in two sizes; nobody changes it."""
+    from sample_dress import sample_dress
+
+    from warpflat.pattern.drafting.draft import draft_garment
+
+    return draft_garment(sample_dress(("36", "38")))
+
+
 @pytest.fixture
 def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Command:
     """Runs the command line in an empty folder, which becomes the current one."""

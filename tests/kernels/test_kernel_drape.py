@@ -13,6 +13,7 @@ from warpflat.kernels.drape import (
     evaluate_cloth,
     evaluate_curvature,
     gather_drape,
+    mat32d,
 )
 from warpflat.kernels.drape_contact import anchor_friction
 from warpflat.kernels.drape_steps import advance_drape, watch_power
@@ -61,7 +62,7 @@ def test_membrane_forces_are_minus_the_gradient_of_its_energy(stretch: tuple[flo
     inputs = [
         on(x, wp.vec3d),
         on([[0, 1, 2]], wp.vec3i),
-        on(along.reshape(1, 4), wp.vec4d),
+        on([[-along.sum(axis=0), *along]], mat32d),
         on([AREA], wp.float64),
         law,
     ]

@@ -58,7 +58,6 @@ from .output import atomic_path as atomic_path
 from .output import expect_files as expect_files
 from .output import file_in as file_in
 from .output import has_seal as has_seal
-from .output import hidden_file as hidden_file
 from .output import latest_file as latest_file
 from .output import optional_file as optional_file
 from .output import optional_step as optional_step
@@ -68,8 +67,6 @@ from .output import recorded_files as recorded_files
 from .output import refuse_to_replace_others as refuse_to_replace_others
 from .output import remove_stale as remove_stale
 from .output import remove_unfinished as remove_unfinished
-from .output import require_own_metrics as require_own_metrics
-from .output import require_writable as require_writable
 from .output import write_json as write_json
 from .output import write_report as write_report
 from .output import write_sealed as write_sealed
@@ -96,6 +93,7 @@ from .text import control_in as control_in
 from .text import energy_words as energy_words
 from .text import find_unused_name as find_unused_name
 from .text import format_count as format_count
+from .text import line_name as line_name
 from .text import name_without_number as name_without_number
 from .text import one_line as one_line
 from .text import other_side as other_side
@@ -114,4 +112,5 @@ from .usd_process import UNREADABLE as UNREADABLE
 from .usd_process import read_apart as read_apart
 from .vectors import laid_upon as laid_upon
 from .vectors import reflected as reflected
+from .vectors import turned_left as turned_left
 from .vectors import unit as unit

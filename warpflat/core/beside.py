@@ -135,30 +135,33 @@ def two_at_a_time(function: Callable[[Item], Result], items: Iterable[Item]) -> 
 
 
 def _answer_in_child(function: Callable[[], Any], answer: Any, parent: int) -> None:
-    """Run the function, and send whether it went well, its result or error, and what it has read and left out."""
+    """Send whether a function went well, its result or error, and what it has read and left out; end the process, whatever happens."""
     import ctypes
 
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-        signal.signal(getattr(signal, name), signal.SIG_DFL)
-    # Let the system kill this process when its parent dies, so that it does not write into a folder that is being
-    # cleared.
-    ctypes.CDLL(None).prctl(_SIGNAL_OF_PARENTS_DEATH, signal.SIGKILL)
-    if os.getppid() != parent:  # it has died meanwhile
-        return
-    good, read, left_out = True, list[Path](), list[LeftOut]()
     try:
-        with (
-            activity_listener(lambda activity: None),
-            listening_to_reads(read.append),
-            listening_to_left_out(left_out.append),
-        ):
-            value = function()
-    except Exception as error:
-        good, value = False, error
-    try:
-        content = pickle.dumps((good, value, read, left_out))
-        pickle.loads(content)  # an exception may not be made again from its arguments
-    except Exception as error:
-        fault = error if good else value
-        content = pickle.dumps((False, RuntimeError(f"{type(fault).__name__}: {fault}"), read, left_out))
-    answer.send_bytes(content)
+        for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+            signal.signal(getattr(signal, name), signal.SIG_DFL)
+        # Let the system kill this process when its parent dies, so that it does not write into a folder that is being
+        # cleared.
+        ctypes.CDLL(None).prctl(_SIGNAL_OF_PARENTS_DEATH, signal.SIGKILL)
+        if os.getppid() != parent:  # it has died meanwhile
+            return
+        good, read, left_out = True, list[Path](), list[LeftOut]()
+        try:
+            with (
+                activity_listener(lambda activity: None),
+                listening_to_reads(read.append),
+                listening_to_left_out(left_out.append),
+            ):
+                value = function()
+        except Exception as error:
+            good, value = False, error
+        try:
+            content = pickle.dumps((good, value, read, left_out))
+            pickle.loads(content)  # an exception may not be made again from its arguments
+        except Exception as error:
+            fault = error if good else value
+            content = pickle.dumps((False, RuntimeError(f"{type(fault).__name__}: {fault}"), read, left_out))
+        answer.send_bytes(content)
+    finally:
+        os._exit(0)

@@ -51,7 +51,6 @@ __all__ = [
     "expect_files",
     "file_in",
     "has_seal",
-    "hidden_file",
     "latest_file",
     "optional_file",
     "optional_step",
@@ -64,8 +63,6 @@ __all__ = [
     "remove_file",
     "remove_stale",
     "remove_unfinished",
-    "require_own_metrics",
-    "require_writable",
     "seal_of",
     "write_json",
     "write_report",
@@ -138,6 +135,8 @@ class _Run:
                 )
         self.expected.update(names)
         _refuse_to_replace((self.folder / name for name in names), self.sources)
+        if self.is_guarded and "metrics.json" in names:
+            _require_own_metrics(self.folder)
 
     def protect(self, source: Path) -> None:
         """A file has been read."""
@@ -213,7 +212,7 @@ def output_folder(
 
     Raises:
         InputError: as :func:`prepare_folder`, nothing can be written into the folder, or it would replace one that was read or, with
-            `guard`, one that is not as warpflat wrote it.
+            `guard`, one that is not as warpflat wrote it; `metrics.json` at once, others when the first file is written.
     """
     expect(path, (str, os.PathLike), "folder", "the path of one")
     folder, files = Path(path), set(files)
@@ -332,7 +331,7 @@ def file_in(folder: Path, name: str, ending: str) -> Path:
 
 
 @contextmanager
-def hidden_file(final: Path) -> Iterator[Path]:
+def _hidden_file(final: Path) -> Iterator[Path]:
     """Yield a fresh hidden name with the suffix of a file; whatever has that name at the end is removed.
 
     It lies beside `final`, or in the hidden folder of the run to which that belongs.
@@ -350,7 +349,7 @@ def hidden_file(final: Path) -> Iterator[Path]:
         _clear_hidden(path)
 
 
-def require_writable(final: str | os.PathLike[str]) -> None:
+def _require_writable(final: str | os.PathLike[str]) -> None:
     """Check that a file of this name can be written; none is left.
 
     Raises:
@@ -364,7 +363,7 @@ def require_writable(final: str | os.PathLike[str]) -> None:
         if run is not None:
             _refuse_to_replace([final], run.sources)
             return
-        with hidden_file(final) as probe:
+        with _hidden_file(final) as probe:
             probe.touch(exist_ok=False)
     except OSError as error:
         raise _cannot_write(final, error) from error
@@ -385,11 +384,11 @@ def atomic_path(final: str | os.PathLike[str], *, sources: Collection[Path] = ()
         InputError: the folder is missing or cannot be written, `final` is a folder or a file that the run has read, or the disk is full.
     """
     final = Path(final)
-    require_writable(final)
+    _require_writable(final)
     _refuse_to_replace([final], sources)
     run = _run_into(final.parent)
     try:
-        with hidden_file(final) as temporary:
+        with _hidden_file(final) as temporary:
             # Created with the user's usual permissions: some libraries write through a private file of their own.
             temporary.touch(exist_ok=False)
             mode = temporary.stat().st_mode
@@ -488,7 +487,7 @@ def optional_file(path: str | os.PathLike[str], files: list[str], *, part: str =
         InputError: the folder cannot be written, the disk is full, or `path` is a folder, or a file that the run has read.
     """
     path = Path(path)
-    require_writable(path)
+    _require_writable(path)
     words = f"{part or path.name} was left out{f' of {path.name}' if part else ''}"
     with optional_step(words, is_needed=False, folder=path.parent) as left_out:
         yield path
@@ -665,7 +664,7 @@ def remove_stale(
     """
     going_on = _run_into(folder)
     removed, notes = list[tuple[str, str]](), list[str]()
-    for run, known in recorded_files(require_own_metrics(folder)).items():
+    for run, known in recorded_files(_require_own_metrics(folder)).items():
         for file, was in known.items():
             is_stale = file.endswith(".draped.obj") and run == name if drape else run == name or file in _NAMELESS
             if file in files or not is_stale:
@@ -701,7 +700,7 @@ def record_file(folder: Path, name: str, file: str) -> None:
         InputError: `metrics.json` cannot be written.
     """
     try:
-        metrics = require_own_metrics(folder)
+        metrics = _require_own_metrics(folder)
     except InputError:
         return  # somebody else's, which knows of no run
     record = recorded_files(metrics)
@@ -714,7 +713,7 @@ def record_file(folder: Path, name: str, file: str) -> None:
         write(folder / "metrics.json", {**metrics, "files": record})
 
 
-def require_own_metrics(folder: Path) -> dict[str, Any]:
+def _require_own_metrics(folder: Path) -> dict[str, Any]:
     """Check that the `metrics.json` of a folder is of warpflat, since a run replaces it; return its content, empty if there is none.
 
     Raises:

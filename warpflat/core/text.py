@@ -11,6 +11,7 @@ __all__ = [
     "control_in",
     "find_unused_name",
     "format_count",
+    "line_name",
     "name_without_number",
     "one_line",
     "other_side",
@@ -52,6 +53,11 @@ def without_side(name: str) -> str:
     """Return a name without its side, left or right: the shoulder of "shoulder left"; underscores become spaces."""
     words = name.replace("_", " ").split(" ")
     return " ".join(word for word in words if word not in ("left", "right")) or name
+
+
+def line_name(name: str) -> str:
+    """Return what the line of an edge is called, without side and number: the neck of "neck left 2"."""
+    return without_side(name).rstrip(" 0123456789")
 
 
 def other_side(name: str) -> str:

@@ -63,7 +63,8 @@ from .flattening.gradient import gradient as gradient
 from .flattening.progress import CONTACT as CONTACT
 from .flattening.progress import STEPS as STEPS
 from .flattening.progress import Progress as Progress
-from .flattening.progress import Stage as Stage
+from .flattening.progress import make_stage as make_stage
+from .flattening.progress import make_stages as make_stages
 from .flattening.progress import relaxation_words as relaxation_words
 from .flattening.result import Flattening as Flattening
 from .flattening.result import run_metrics as run_metrics
@@ -101,7 +102,6 @@ from .model.springs import springs_of as springs_of
 from .model.springs import with_stiffness as with_stiffness
 from .model.strain import WornStrain as WornStrain
 from .model.strain import shear_angles as shear_angles
-from .model.strain import strain_energy as strain_energy
 from .model.strain import worn_strain as worn_strain
 from .model.wear import SKIN_LENGTH as SKIN_LENGTH
 from .model.wear import Wear as Wear
@@ -128,6 +128,7 @@ from .surface.border_seams import surface_seams as surface_seams
 from .surface.closest import nearest_on_triangles as nearest_on_triangles
 from .surface.connectivity import border_loops as border_loops
 from .surface.connectivity import border_of as border_of
+from .surface.connectivity import chain_lines as chain_lines
 from .surface.connectivity import components as components
 from .surface.connectivity import euler_characteristic as euler_characteristic
 from .surface.connectivity import join_labels as join_labels

@@ -55,6 +55,7 @@ from .drafting.worn import ViewedPiece as ViewedPiece
 from .drafting.worn import Worn as Worn
 from .export.colours import DRAFTED_CLOTH as DRAFTED_CLOTH
 from .export.colours import ENERGY as ENERGY
+from .export.colours import LEAST_GAP as LEAST_GAP
 from .export.colours import SKIN as SKIN
 from .export.colours import SMALLEST_SCALE as SMALLEST_SCALE
 from .export.colours import Scale as Scale
@@ -87,6 +88,7 @@ from .export.ledger_picture import write_ledger_picture as write_ledger_picture
 from .export.letters import all_letters as all_letters
 from .export.letters import note_on_names as note_on_names
 from .export.obj import write_obj as write_obj
+from .export.packing import rows_on_table as rows_on_table
 from .export.pattern_json import read_pattern_json as read_pattern_json
 from .export.pattern_json import write_pattern_json as write_pattern_json
 from .export.pdf import too_many_sheets as too_many_sheets
@@ -111,10 +113,10 @@ from .export.usd_prims import begin_stage as begin_stage
 from .export.usd_prims import bounding_box as bounding_box
 from .export.usd_prims import define_group as define_group
 from .export.usd_prims import define_mesh as define_mesh
+from .export.usd_prims import define_subsets as define_subsets
 from .export.usd_prims import export_stage as export_stage
 from .export.usd_prims import last_values_as_defaults as last_values_as_defaults
 from .export.usd_prims import part_path as part_path
-from .export.usd_prims import rows_on_table as rows_on_table
 from .export.usd_prims import set_face_map as set_face_map
 from .export.usd_prims import set_points as set_points
 from .export.usd_prims import usd_errors as usd_errors

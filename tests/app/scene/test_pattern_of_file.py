@@ -187,7 +187,7 @@ def test_curves_keep_their_lengths_through_a_coarse_mesh(tmp_path: Path):
     for title, one, other in (("one", "left", "right"), ("two", "right", "left")):
         sides = (SeamSide(piece="front", edge=one),), (SeamSide(piece="back", edge=other, reversed=True),)
         seams.append(Seam(name=title, sides=sides))
-    meshes, welds = mesh_pieces(pieces, seams, 0.01)
+    _, meshes, welds = mesh_pieces(pieces, seams, 0.01)
     first = len(meshes["front"].points)
     flat = np.concatenate([meshes["front"].points, meshes["back"].points])
     sewn = np.arange(len(flat))

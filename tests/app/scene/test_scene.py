@@ -214,7 +214,6 @@ def test_frames_thin_out_or_come_at_equal_steps():
     assert np.all(np.diff(due, n=2) >= -1)
     seldom = FrameSchedule(OutputTable(frames=40))
     assert [step for step in range(0, 101, 10) if seldom.is_due(step, 10_000)] == [0, 10, 20, 30, 40, 60, 80]
-    assert not FrameSchedule(OutputTable(frames=0)).wanted
 
 
 # --- running

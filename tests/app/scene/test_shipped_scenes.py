@@ -230,7 +230,7 @@ def _assert_every_edge_is_used_up_by_one_step(drafted: DraftedGarment) -> None:
     steps = sewing_steps(drafted, only_size(drafted))
     finished = [place for step in steps for place in step.finished]
     assert len(finished) == len(set(finished))
-    joined = {(side.piece, side.edge) for seam in drafted.garment.seams for row in seam.sides for side in row}
+    joined = {side.place for seam in drafted.garment.seams for side in seam.stretches}
     assert not joined & set(finished)
     every = {
         (piece.name, edge.name)
@@ -263,7 +263,7 @@ def _assert_a_seam_comes_after_those_that_end_on_its_line(drafted: DraftedGarmen
     number = {}
     for at, step in enumerate(sewing_steps(drafted, only_size(drafted))):
         for seam in drafted.garment.seams:
-            places = [(side.piece, side.edge) for row in seam.sides for side in row]
+            places = [side.place for side in seam.stretches]
             if seam.name not in number and all(edge in step.sewn.get(piece, ()) for piece, edge in places):
                 number[seam.name] = at
     ends = {

@@ -10,8 +10,8 @@ from surface_meshes import broken_invariants, cylinder, grid
 
 from warpflat.app.cli.main import main
 from warpflat.core.errors import InputError
+from warpflat.flat.surface.connectivity import chain_lines
 from warpflat.flat.surface.io.read import METRES_PER_UNIT, read_scan, read_surface
-from warpflat.flat.surface.io.read_obj import chain_lines
 from warpflat.flat.surface.triangles import triangulate
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from flat_forms import flat_form
+from flat_forms import flat_form, pattern_of, whole_draft
 
 from warpflat.core.errors import InputError
 from warpflat.garment.construction.button_stand import button_depths
@@ -16,7 +16,6 @@ from warpflat.garment.construction.finishing import Finishing
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.linings import add_interfacing
 from warpflat.garment.construction.openings import Buttons, Opening, OpeningPart, place_opening
-from warpflat.garment.construction.to_pattern import pattern_of_garment
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.pieces import Pattern
 
@@ -36,13 +35,13 @@ def whole() -> Garment:
     return flat_form("bodice")
 
 
-def pattern_of(garment: Garment, *openings: Opening, finishing: tuple[Finishing, ...] = ()) -> Pattern:
-    return pattern_of_garment({"": replace(garment, openings=openings, finishing=finishing)}, name="bodice")[0]
+def opened(garment: Garment, *openings: Opening, finishing: tuple[Finishing, ...] = ()) -> Pattern:
+    return pattern_of(garment, *finishing, openings=openings)
 
 
 def test_stand_lies_upon_the_other_half_where_it_is_buttoned(bodice: Garment):
     separate = replace(BUTTONED, buttons=replace(BUTTONED.buttons, facing="separate"))
-    before, after = pattern_of(bodice).piece("front_left", ""), pattern_of(bodice, separate).piece("front_left", "")
+    before, after = opened(bodice).piece("front_left", ""), opened(bodice, separate).piece("front_left", "")
     line = after.internal_lines["centre front"]
     along = (line[1] - line[0]) / np.linalg.norm(line[1] - line[0])
     across = np.array([along[1], -along[0]])
@@ -56,7 +55,7 @@ def test_stand_lies_upon_the_other_half_where_it_is_buttoned(bodice: Garment):
 
 
 def test_buttons_lie_on_the_centre_and_one_on_the_bust(bodice: Garment):
-    pattern = pattern_of(bodice, BUTTONED)
+    pattern = opened(bodice, BUTTONED)
     front = pattern.piece("front_left", "")
     marks = np.array(list(front.marks.values()))
     assert len(marks) >= 4
@@ -74,11 +73,10 @@ def test_buttons_lie_on_the_centre_and_one_on_the_bust(bodice: Garment):
 @pytest.mark.parametrize("facing", ["grown-on", "separate"])
 def test_facing_of_neck_and_stand_is_joined_at_the_shoulders(bodice: Garment, facing: str):
     opening = replace(BUTTONED, buttons=replace(BUTTONED.buttons, facing=facing))
-    pattern = pattern_of(bodice, opening, finishing=(FACING,))
+    pattern = opened(bodice, opening, finishing=(FACING,))
     names = [piece.name for piece in pattern.pieces[""]]
     assert ("front_left_neck_facing" in names) == (facing == "separate")
-    drafted = draft_garment(pattern)
-    assert all(seam.matches for seam in drafted.seams)
+    drafted = whole_draft(pattern)
     own = {seam.name: seam for seam in drafted.seams}
     assert {"front left neck facing", "back neck facing", "shoulder left of neck facing"} <= set(own)
     assert own["shoulder left of neck facing"].length_mm[0] == pytest.approx(55.0, abs=0.1)
@@ -94,10 +92,10 @@ def test_facing_of_neck_and_stand_is_joined_at_the_shoulders(bodice: Garment, fa
 
 
 def test_interfacing_of_a_grown_on_facing_is_as_large_as_that(bodice: Garment):
-    pattern = add_interfacing(pattern_of(bodice, BUTTONED, finishing=(FACING,)), "fleece")
+    pattern = add_interfacing(opened(bodice, BUTTONED, finishing=(FACING,)), "fleece")
     front, own = pattern.piece("front_left", ""), pattern.piece("front_left_facing_interfacing", "")
     separate = replace(BUTTONED, buttons=replace(BUTTONED.buttons, facing="separate"))
-    facing = pattern_of(bodice, separate, finishing=(FACING,)).piece("front_left_neck_facing", "")
+    facing = opened(bodice, separate, finishing=(FACING,)).piece("front_left_neck_facing", "")
     assert shapely.Polygon(own.outline).area == pytest.approx(shapely.Polygon(facing.outline).area, rel=1e-6)
     assert shapely.Polygon(front.outline).buffer(1e-6).contains(shapely.Polygon(own.outline))
     assert (own.fabric, own.quantity) == ("fleece", 2)
@@ -112,12 +110,12 @@ def test_ring_open_from_edge_to_edge_passes(bodice: Garment):
 
 
 def test_stand_of_a_part_of_the_seam_leaves_the_rest_sewn(bodice: Garment):
-    pattern = pattern_of(bodice, replace(BUTTONED, length=0.2))
+    pattern = opened(bodice, replace(BUTTONED, length=0.2))
     front = pattern.piece("front_left", "")
     assert "centre front" in {seam.name for seam in pattern.seams}
-    full = pattern_of(bodice).piece("front_left", "").edge("centre front").length
+    full = opened(bodice).piece("front_left", "").edge("centre front").length
     assert front.edge("centre front").length == pytest.approx(full - 0.2, abs=1e-3)
-    assert all(seam.matches for seam in draft_garment(pattern).seams)
+    whole_draft(pattern)
 
 
 def test_a_stand_all_along_an_edge_ends_with_it(bodice: Garment, monkeypatch: pytest.MonkeyPatch):
@@ -127,7 +125,7 @@ def test_a_stand_all_along_an_edge_ends_with_it(bodice: Garment, monkeypatch: py
         return [replace(part, whole=part.whole - 3e-6) for part in place_opening(*given)]
 
     monkeypatch.setattr("warpflat.garment.construction.to_pattern.place_opening", shorter)
-    assert "centre front" not in {edge.name for edge in pattern_of(bodice, BUTTONED).piece("front_left", "").edges}
+    assert "centre front" not in {edge.name for edge in opened(bodice, BUTTONED).piece("front_left", "").edges}
 
 
 def test_buttons_keep_to_the_count_of_another_size():
@@ -141,12 +139,12 @@ def test_buttons_keep_to_the_count_of_another_size():
 def test_curved_edge_has_no_stand(whole: Garment):
     side = Opening(kind="buttons", line="side left", length=np.inf, width=0.02, buttons=Buttons())
     with pytest.raises(InputError, match=r"strays .* mm from straight and cannot have a button stand"):
-        pattern_of(whole, side)
+        opened(whole, side)
 
 
 def test_keyhole_is_drawn_on_its_piece_and_on_its_facing(whole: Garment):
     hole = Opening(kind="keyhole", line="centre back", length=0.12, width=0.012)
-    plain, pattern = pattern_of(whole, finishing=(FACING,)), pattern_of(whole, hole, finishing=(FACING,))
+    plain, pattern = opened(whole, finishing=(FACING,)), opened(whole, hole, finishing=(FACING,))
     assert [piece.name for piece in pattern.pieces[""]] == [piece.name for piece in plain.pieces[""]]
     for name in ("back", "back_neck_facing"):
         piece = pattern.piece(name, "")

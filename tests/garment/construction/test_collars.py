@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from flat_forms import flat_form
+from flat_forms import flat_form, pattern_of, whole_draft
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length
@@ -16,7 +16,6 @@ from warpflat.garment.construction.finishing import Finishing
 from warpflat.garment.construction.free_edges import free_chain, joined_line
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.openings import Buttons, Opening
-from warpflat.garment.construction.to_pattern import pattern_of_garment
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.fitting import drawn_length
 from warpflat.pattern.drafting.piece_parts import Edge
@@ -49,12 +48,11 @@ def buttoned() -> Garment:
 
 def with_neck(garment: Garment, kind: str = "collar", **collar: object) -> Pattern:
     wish = Finishing(kind=kind, edge="neck", width=0.03, collar=Collar(**{"style": "", "width": 0.03, **collar}))  # type: ignore[arg-type]
-    return pattern_of_garment({"": replace(garment, finishing=(wish,))}, name="garment")[0]
+    return pattern_of(garment, wish)
 
 
 def check_seams(pattern: Pattern) -> None:
-    drafted = draft_garment(pattern)
-    assert all(seam.matches for seam in drafted.seams)
+    drafted = whole_draft(pattern)
     on = {"collar_on", "collar_stand_on", "collar_between", "hood", "rib"}
     assert any(step.technique in on for step in sewing_steps(drafted, ""))
 
@@ -84,8 +82,8 @@ def test_outer_edge_of_a_shirt_collar_reaches_around_the_line_below_the_seam_of_
     assert drawn(collar.edge("lower")) == pytest.approx(drawn(stand.edge("upper")), abs=2e-5)
     # From one centre front to the other: the button stand lies beyond.
     assert stand.edge("lower").length - stand.edge("upper").length > 2.0 * BUTTONS.width
-    chain = free_chain(pattern_of_garment({"": buttoned}, name="plain")[0], [("front_left", "neck"), ("back", "neck")])
-    plain = pattern_of_garment({"": buttoned}, name="plain")[0]
+    chain = free_chain(pattern_of(buttoned), [("front_left", "neck"), ("back", "neck")])
+    plain = pattern_of(buttoned)
     line, at = joined_line(plain, chain, ""), plain.piece("front_left", "").edge("neck").length
     back = plain.piece("back", "").edge("neck").length
     behind = points_at_lengths(line, np.linspace(at, at + back, 200))
@@ -176,7 +174,7 @@ def test_placket_opens_the_neck_in_front_and_its_strips_fill_a_box(plain: Garmen
         kind="collar", edge="neck", width=0.07, placket=0.14, collar=Collar(style="convertible", width=0.07)
     )
     garment = replace(plain, finishing=(wish,))
-    pattern = pattern_of_garment({"": garment}, name="garment")[0]
+    pattern = pattern_of(garment)
     check_seams(pattern)
     strips, front = pattern.piece("neck_placket", ""), pattern.piece("front", "")
     assert strips.quantity == 2
@@ -194,4 +192,4 @@ def test_placket_opens_the_neck_in_front_and_its_strips_fill_a_box(plain: Garmen
     rings = {ring.name: ring for ring in garment.rings}
     assert rings["neck"].opened == pytest.approx(0.28)
     with pytest.raises(InputError, match="does not lie within 'front'"):
-        pattern_of_garment({"": replace(plain, finishing=(replace(wish, placket=0.9),))}, name="garment")
+        pattern_of(plain, replace(wish, placket=0.9))

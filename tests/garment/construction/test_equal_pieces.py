@@ -56,7 +56,7 @@ def test_gores_that_are_equal_are_cut_from_one_and_all_their_seams_are_told() ->
         "outlines by at most 0.3 mm",
     )
     # Each copy's two edges are sewn once, each the same way round as that which is drawn.
-    sides = [side for seam in pattern.seams for row in seam.sides for side in row]
+    sides = [side for seam in pattern.seams for side in seam.stretches]
     assert sorted((side.copy, side.edge) for side in sides) == [(k, f"edge {e}") for k in range(6) for e in (0, 1)]
     assert all(len({side.reversed for side in sides if side.edge == edge}) == 1 for edge in ("edge 0", "edge 1"))
     # Notches of one letter meet, as far from the tip.
@@ -71,7 +71,7 @@ def test_gores_that_are_equal_are_cut_from_one_and_all_their_seams_are_told() ->
     assert {seam.name: seam.sides for seam in seams_of_words(words)} == {s.name: s.sides for s in pattern.seams}
     whole, seams, _ = whole_pieces(pattern.pieces[""], pattern.seams)
     assert set(whole) == {"piece_0", *(f"piece_0 copy {k}" for k in range(2, 7))}
-    assert len({(side.piece, side.edge) for seam in seams for row in seam.sides for side in row}) == 12
+    assert len({side.place for seam in seams for side in seam.stretches}) == 12
 
 
 def test_pieces_that_differ_or_lie_across_the_grain_are_drawn_each() -> None:

@@ -7,13 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from flat_forms import flat_form
+from flat_forms import flat_form, pattern_of, whole_draft
 
 from warpflat.core.errors import InputError
 from warpflat.garment.construction.finishing import Finishing
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.openings import Opening
-from warpflat.garment.construction.to_pattern import pattern_of_garment
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.fitting import drawn_length
 from warpflat.pattern.drafting.pieces import Pattern
@@ -35,17 +34,13 @@ def half() -> Garment:
     return flat_form("bodice", half=True)
 
 
-def finished(garment: Garment, *wishes: Finishing) -> Pattern:
-    return pattern_of_garment({"": replace(garment, finishing=wishes)}, name="bodice")[0]
-
-
 def edge_length(pattern: Pattern, places: Sequence[tuple[str, str]]) -> float:
     """Return the length of edges along the curves as which they are drawn."""
     return sum(drawn_length(pattern.piece(piece, "").edge(edge).points) for piece, edge in places)
 
 
 def test_facings_repeat_the_neck_and_are_joined_at_the_shoulders(parted: Garment):
-    pattern = finished(parted, FACING)
+    pattern = pattern_of(parted, FACING)
     front, back = pattern.piece("front_neck_facing", ""), pattern.piece("back_left_neck_facing", "")
     assert (front.quantity, back.quantity) == (1, 2)
     assert front.edge("neck").length == pytest.approx(pattern.piece("front", "").edge("neck").length)
@@ -64,7 +59,7 @@ def test_facings_repeat_the_neck_and_are_joined_at_the_shoulders(parted: Garment
 
 def test_band_of_a_closed_neck_is_a_ring(half: Garment):
     share = 0.87
-    pattern = finished(half, Finishing(kind="band", edge="neck", width=0.02, share=share))
+    pattern = pattern_of(half, Finishing(kind="band", edge="neck", width=0.02, share=share))
     whole = 2 * edge_length(pattern, [("front", "neck"), ("back", "neck")])
     band = pattern.piece("neck_band", "")
     assert band.quantity == 1
@@ -72,12 +67,12 @@ def test_band_of_a_closed_neck_is_a_ring(half: Garment):
     seams = {seam.name: seam for seam in pattern.seams}
     assert len(seams["neck band"].sides[1]) == 4
     assert "neck band ends" in seams
-    assert all(report.matches for report in draft_garment(pattern).seams)
+    whole_draft(pattern)
 
 
 def test_zip_at_one_side_of_a_half_opens_its_ring_once(half: Garment):
     shoulder = Opening(kind="zip", line="shoulder left", length=0.1)
-    pattern = finished(replace(half, openings=(shoulder,)), Finishing(kind="band", edge="neck", width=0.02))
+    pattern = pattern_of(replace(half, openings=(shoulder,)), Finishing(kind="band", edge="neck", width=0.02))
     seams = {seam.name: seam for seam in pattern.seams}
     # All around, and not sewn to a ring.
     assert len(seams["neck band"].sides[1]) == 4
@@ -86,7 +81,7 @@ def test_zip_at_one_side_of_a_half_opens_its_ring_once(half: Garment):
 
 def test_waistband_ends_at_the_zip(parted: Garment):
     opened = replace(parted, openings=(replace(ZIP, length=0.1),))
-    pattern = finished(opened, Finishing(kind="waistband", edge="neck", width=0.03, overlap=0.025))
+    pattern = pattern_of(opened, Finishing(kind="waistband", edge="neck", width=0.03, overlap=0.025))
     band = pattern.piece("waistband", "")
     sides = next(seam for seam in pattern.seams if seam.name == "waistband").sides[1]
     # From one side of the centre back around to the other.
@@ -96,7 +91,7 @@ def test_waistband_ends_at_the_zip(parted: Garment):
     assert band.edge("lower").length == pytest.approx(length)
     assert band.edge("upper").length == pytest.approx(length + 0.025)
     assert "waistband ends" not in {seam.name for seam in pattern.seams}
-    assert all(report.matches for report in draft_garment(pattern).seams)
+    whole_draft(pattern)
     # What runs past one end has the button, and the buttonhole lies as far from the other one: closed, both ends meet at the zip.
     np.testing.assert_allclose(band.marks["button"], [length + 0.0125, 0.015])
     np.testing.assert_allclose(band.internal_lines["buttonhole"].mean(axis=0), [0.0125, 0.015])
@@ -104,7 +99,7 @@ def test_waistband_ends_at_the_zip(parted: Garment):
 
 
 def test_armholes_get_a_binding_each(parted: Garment):
-    pattern = finished(parted, Finishing(kind="binding", edge="armhole", width=0.035))
+    pattern = pattern_of(parted, Finishing(kind="binding", edge="armhole", width=0.035))
     binding = pattern.piece("armhole_binding", "")
     assert binding.quantity == 2
     assert binding.edge("lower").length == pytest.approx(
@@ -118,6 +113,6 @@ def test_armholes_get_a_binding_each(parted: Garment):
 
 def test_edge_that_is_not_free_is_named(parted: Garment):
     with pytest.raises(InputError, match=r"finishing\[0\]: no free edge 'shoulder'"):
-        finished(parted, replace(FACING, edge="shoulder"))
+        pattern_of(parted, replace(FACING, edge="shoulder"))
     with pytest.raises(InputError, match="shorter than the facing is wide"):
-        finished(parted, replace(FACING, width=0.25))
+        pattern_of(parted, replace(FACING, width=0.25))

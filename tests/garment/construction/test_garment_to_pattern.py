@@ -116,7 +116,7 @@ def test_an_edge_that_is_sewn_in_part_is_split_there(mannequins):
     assert {edge.name for edge in sides} == {"side left", "side left 2"}
     assert sorted(edge.first for edge in sides) == [0, min(edge.last for edge in sides)]
     seam = next(seam for seam in plan.seams if seam.name == "side left")
-    assert {str(side) for row in seam.sides for side in row} == {"front.side left", "back.side left"}
+    assert {str(side) for side in seam.stretches} == {"front.side left", "back.side left"}
     sewn = next(edge for edge in sides if edge.name == "side left")
     assert sewn.last - sewn.first == len(result.pieces["back"].edges["side left"]) - 1
     assert kinds(plan, "back")["thigh"] == "hem"
@@ -262,7 +262,7 @@ def test_every_form_can_be_cut_and_sewn(form: str, half: bool, mannequins: dict[
                     notch.length
                     for piece in pieces
                     for notch in piece.notches
-                    if notch.seam == seam.name and (piece.name, notch.edge) in {(s.piece, s.edge) for s in side}
+                    if notch.seam == seam.name and (piece.name, notch.edge) in {s.place for s in side}
                 )
                 for side in seam.sides
             ]

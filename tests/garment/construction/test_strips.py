@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from flat_forms import flat_form
+from flat_forms import flat_form, pattern_of, whole_draft
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
@@ -16,9 +15,6 @@ from warpflat.garment.construction.finishing import Finishing
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.openings import Opening
 from warpflat.garment.construction.strips import Strip, swept
-from warpflat.garment.construction.to_pattern import pattern_of_garment
-from warpflat.pattern.drafting.draft import draft_garment
-from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.fitting import drawn_length
 from warpflat.pattern.drafting.half_pieces import halved
 from warpflat.pattern.drafting.pieces import Pattern
@@ -37,21 +33,9 @@ def half_skirt() -> Garment:
     return flat_form("skirt", half=True)
 
 
-def finished(garment: Garment, *wishes: Finishing) -> Pattern:
-    return pattern_of_garment({"": replace(garment, finishing=wishes)}, name="garment")[0]
-
-
-@functools.lru_cache(maxsize=1)
-def drafted_once(pattern: Pattern) -> DraftedGarment:
-    """The pattern as it is drawn, whatever is asked of it."""
-    return draft_garment(pattern)
-
-
 def lengths(pattern: Pattern) -> Mapping[str, tuple[float, float]]:
     """Lengths of both sides of every seam [mm], all of which match."""
-    drafted = drafted_once(pattern)
-    assert all(seam.matches for seam in drafted.seams)
-    return {seam.name: seam.length_mm for seam in drafted.seams}
+    return {seam.name: seam.length_mm for seam in whole_draft(pattern).seams}
 
 
 @pytest.mark.parametrize("turn", [-1.2, -0.2, 0.3])
@@ -64,9 +48,9 @@ def test_curved_strip_has_the_length_of_its_edge_and_its_outer_edge_follows_from
 
 
 def test_rib_takes_the_place_of_a_strip_along_the_hem(shirt: Garment):
-    plain = pattern_of_garment({"": shirt}, name="garment")[0]
+    plain = pattern_of(shirt)
     rib = Finishing(kind="band", edge="hip", width=0.06, share=0.85, shorten=0.06)
-    pattern = finished(shirt, rib)
+    pattern = pattern_of(shirt, rib)
     side = ("front", "side left")
     assert plain.piece(side[0], "").edge(side[1]).length - pattern.piece(side[0], "").edge(side[1]).length == (
         pytest.approx(0.06)
@@ -81,7 +65,7 @@ def test_rib_takes_the_place_of_a_strip_along_the_hem(shirt: Garment):
 
 def test_cuff_is_buttoned_behind_where_the_sleeve_is_slit(shirt: Garment):
     cuff = Finishing(kind="cuff", edge="wrist", width=0.06, share=0.8, overlap=0.025, shorten=0.05, placket=0.11)
-    pattern = finished(shirt, cuff)
+    pattern = pattern_of(shirt, cuff)
     piece = pattern.piece("cuff", "")
     assert piece.quantity == 2
     assert "button" in piece.marks
@@ -104,25 +88,25 @@ def test_cuff_is_buttoned_behind_where_the_sleeve_is_slit(shirt: Garment):
     binding = pattern.piece("sleeve_placket", "")
     assert binding.quantity == 2
     assert binding.edge("lower").length > 0.22
-    steps = [step.words for step in sewing_steps(drafted_once(pattern), "")]
+    steps = [step.words for step in sewing_steps(whole_draft(pattern), "")]
     assert any("slits" in step for step in steps)
     assert any("buttonhole at one end" in step and "cuff" in step for step in steps)
-    assert "2 small buttons" in notions(drafted_once(pattern), "")
+    assert "2 small buttons" in notions(whole_draft(pattern), "")
     with pytest.raises(InputError, match="does not lie within the piece"):
-        finished(shirt, replace(cuff, placket=0.9))
+        pattern_of(shirt, replace(cuff, placket=0.9))
 
 
 def test_ruffle_is_gathered_itself(shirt: Garment):
-    pattern = finished(shirt, Finishing(kind="ruffle", edge="hip", width=0.1, share=2.2))
+    pattern = pattern_of(shirt, Finishing(kind="ruffle", edge="hip", width=0.1, share=2.2))
     found = lengths(pattern)["hip ruffle"]
     assert found[1] == pytest.approx(2.2 * found[0], abs=0.1)
     assert pattern.piece("hip_ruffle", "").edge("upper").kind == "hem"
-    assert any("gather the hip ruffle" in step.words for step in sewing_steps(drafted_once(pattern), ""))
+    assert any("gather the hip ruffle" in step.words for step in sewing_steps(whole_draft(pattern), ""))
 
 
 @pytest.mark.parametrize("turns", [0.5, 1.0])
 def test_flounce_has_a_panel_for_each_piece_and_the_hem_of_a_ring(half_skirt: Garment, turns: float):
-    pattern = finished(half_skirt, Finishing(kind="flounce", edge="knee", width=0.2, turns=turns))
+    pattern = pattern_of(half_skirt, Finishing(kind="flounce", edge="knee", width=0.2, turns=turns))
     found = lengths(pattern)
     assert {"front knee flounce", "back knee flounce", "side left of the flounce"} <= set(found)
     panels = [piece for piece in pattern.pieces[""] if piece.name.endswith("flounce")]
@@ -132,26 +116,26 @@ def test_flounce_has_a_panel_for_each_piece_and_the_hem_of_a_ring(half_skirt: Ga
     hem = 2.0 * sum(piece.edge("hem").length for piece in panels)
     assert hem - inner == pytest.approx(2.0 * np.pi * turns * 0.2, rel=1e-3)
     with pytest.raises(InputError, match="take fewer turns"):
-        finished(half_skirt, Finishing(kind="flounce", edge="knee", width=0.2, turns=2.5))
+        pattern_of(half_skirt, Finishing(kind="flounce", edge="knee", width=0.2, turns=2.5))
 
 
 def test_casing_is_turned_in_and_has_an_elastic_of_the_body(half_skirt: Garment):
-    pattern = finished(half_skirt, Finishing(kind="casing", edge="waist", width=0.03, elastic=0.9))
+    pattern = pattern_of(half_skirt, Finishing(kind="casing", edge="waist", width=0.03, elastic=0.9))
     edge = pattern.piece("front", "").edge("waist")
     assert (edge.kind, edge.width) == ("hem", pytest.approx(0.04))
     assert half_skirt.mannequin is not None
     girth = half_skirt.mannequin.levels()["waist"].girth
     assert pattern.elastics[0].lengths[""] == pytest.approx(0.9 * girth)
-    drafted = drafted_once(pattern)
+    drafted = whole_draft(pattern)
     assert any("thread elastic" in step.words for step in sewing_steps(drafted, ""))
     assert any("elastic" in notion for notion in notions(drafted, ""))
     with pytest.raises(InputError, match="no free edge 'hip'"):
-        finished(half_skirt, Finishing(kind="casing", edge="hip", width=0.03, elastic=0.9))
+        pattern_of(half_skirt, Finishing(kind="casing", edge="hip", width=0.03, elastic=0.9))
 
 
 def test_pleats_of_a_ruffle_lie_beside_each_other(half_skirt: Garment):
     wish = Finishing(kind="ruffle", edge="knee", width=0.2, share=3.0, pleat=0.05)
-    pattern = finished(half_skirt, wish)
+    pattern = pattern_of(half_skirt, wish)
     ruffle = pattern.piece("knee_ruffle", "")
     whole = ruffle.edge("lower").length
     folds = sorted(line[0, 0] for name, line in ruffle.internal_lines.items() if name.startswith("pleat fold"))
@@ -162,14 +146,14 @@ def test_pleats_of_a_ruffle_lie_beside_each_other(half_skirt: Garment):
     # A third of each stays visible, and the strip begins and ends in the inner fold of a pleat.
     assert np.array(folds) - ends == pytest.approx(stretch / 3.0)
     assert ends[0] == pytest.approx(stretch / 3.0) == pytest.approx(whole - folds[-1])
-    assert "Lay the pleats" in " ".join(step.words for step in sewing_steps(drafted_once(pattern), ""))
+    assert "Lay the pleats" in " ".join(step.words for step in sewing_steps(whole_draft(pattern), ""))
     lengths(pattern)
 
 
 @pytest.mark.parametrize(("cloth", "count"), [(1.4, 3), (0.9, 4), (4.0, 1)])
 def test_strip_that_is_wider_than_the_cloth_is_cut_as_equal_panels(shirt: Garment, cloth: float, count: int):
     wish = Finishing(kind="ruffle", edge="hip", width=0.2, share=3.0, pleat=0.04)
-    pattern, _ = pattern_of_garment({"": replace(shirt, finishing=[wish])}, name="garment", cloth_width=cloth)
+    pattern = pattern_of(shirt, wish, cloth_width=cloth)
     panel = pattern.piece("hip_ruffle", "")
     assert panel.quantity == count
     assert np.ptp(panel.outline[:, 0]) + 2.0 * panel.edge("right end").width <= cloth
@@ -178,7 +162,7 @@ def test_strip_that_is_wider_than_the_cloth_is_cut_as_equal_panels(shirt: Garmen
     joints = [seam for seam in pattern.seams if seam.name.startswith("hip ruffle ends")]
     assert len(joints) == count
     # All are sewn alike, and where they lie along the edge is marked there, not on the panel.
-    drafted = drafted_once(pattern)
+    drafted = whole_draft(pattern)
     own = [
         notch
         for notch in next(piece for piece in drafted.pieces[""] if piece.name == "hip_ruffle").notches
@@ -202,7 +186,7 @@ def test_strip_that_is_wider_than_the_cloth_is_cut_as_equal_panels(shirt: Garmen
 
 def test_flounce_that_is_wider_than_the_cloth_is_cut_as_equal_panels(shirt: Garment):
     wish = Finishing(kind="flounce", edge="hip", width=0.6, turns=1.0)
-    pattern, _ = pattern_of_garment({"": replace(shirt, finishing=[wish])}, name="garment", cloth_width=1.15)
+    pattern = pattern_of(shirt, wish, cloth_width=1.15)
     panels = [piece for piece in pattern.pieces[""] if "flounce" in piece.name]
     assert max(piece.quantity for piece in panels) > 1
     assert all(np.ptp(piece.outline[:, 0]) < 1.15 for piece in panels)
@@ -213,8 +197,7 @@ def test_flounce_that_is_wider_than_the_cloth_is_cut_as_equal_panels(shirt: Garm
     ends = [
         (side.piece, side.edge, side.copy, side.mirrored)
         for seam in pattern.seams
-        for row in seam.sides
-        for side in row
+        for side in seam.stretches
         if "flounce" in side.piece and side.edge != "hip"
     ]
     assert len(ends) == len(set(ends)) == 2 * sum(piece.quantity for piece in panels)

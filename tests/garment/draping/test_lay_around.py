@@ -43,10 +43,10 @@ def joined(first: str, second: str) -> Seam:
 
 def lay(pieces: Sequence[Piece], seams: Sequence[Seam], **more: object) -> tuple[SewnCloth, list[Opening], Laid]:
     named = {each.name: each for each in pieces}
-    meshes, welds = mesh_pieces(named, seams, 0.03)
-    cloth = sew_meshes(named, meshes, welds, fabric=warpflat.find_fabric("woven"))
+    meshed = mesh_pieces(named, seams, 0.03)
+    cloth = sew_meshes(meshed, warpflat.find_fabric("woven"))
     openings = find_openings(cloth)
-    laid = lay_pieces(cloth, named, meshes, openings, body_of_size(30.0), **more)  # type: ignore[arg-type]
+    laid = lay_pieces(cloth, meshed, openings, body_of_size(30.0), **more)  # type: ignore[arg-type]
     return cloth, openings, laid
 
 

@@ -69,7 +69,7 @@ def test_both_sides_of_a_seam_get_the_same_points():
     pieces, seams, notes = whole_pieces([darted(), other, polygon("spare", [(0, 0), (1, 0), (0, 1)])], [joined])
     assert notes == ["left out, as no seam joins them: spare"]
     assert [s.name for s in seams] == ["yoke", "front.bust"]
-    meshes, welds = mesh_pieces(pieces, seams, 0.02)
+    _, meshes, welds = mesh_pieces(pieces, seams, 0.02)
     front, yoke = meshes["front"], meshes["yoke"]
     corner = front.points[front.triangles]
     areas = 0.5 * np.linalg.det(corner[:, 1:] - corner[:, :1])
@@ -112,7 +112,7 @@ def test_halves_and_pairs_are_made_whole():
         "e2 mirrored",
         "e1 mirrored",
     ]
-    texts = {s.name: tuple(f"{x} {x.reversed}" for chain in s.sides for x in chain) for s in seams}
+    texts = {s.name: tuple(f"{x} {x.reversed}" for x in s.stretches) for s in seams}
     assert texts == {
         "side": ("front.e2 False", "side.e4 True"),
         "back": ("side.e2 False", "side mirrored.e2 True"),
@@ -440,10 +440,11 @@ def test_a_band_goes_on_beyond_its_seam_as_the_cloth_does(top: str):
         seam("turn", f"band.{top}", f"fall.{'e1' if top == 'e3' else 'e3'}"),
         seam("side", "tube.e2", "tube.e4"),
     ]
-    meshes, welds = mesh_pieces(pieces, seams, 0.02)
+    meshed = mesh_pieces(pieces, seams, 0.02)
+    meshes = meshed.meshes
     flat = meshes["tube"].points
     lies = np.column_stack([radius * np.sin(flat[:, 0] / radius), flat[:, 1], radius * np.cos(flat[:, 0] / radius)])
-    found = continue_pieces({"tube": lies}, meshes, welds)
+    found = continue_pieces({"tube": lies}, meshed)
     np.testing.assert_array_equal(found["tube"], lies)
     for name, begins in (("band", tall), ("fall", tall + 0.05)):
         x, y = meshes[name].points.T
@@ -453,7 +454,7 @@ def test_a_band_goes_on_beyond_its_seam_as_the_cloth_does(top: str):
         assert np.linalg.norm(found[name] - asked, axis=1).max() < 0.015
         assert np.linalg.norm(found[name] - asked, axis=1).mean() < 0.006
     with pytest.raises(InputError, match="'fall' is sewn to no piece that has a designed surface"):
-        continue_pieces({"tube": lies}, meshes, welds[:1])
+        continue_pieces({"tube": lies}, meshed._replace(welds=meshed.welds[:1]))
 
 
 def test_a_cuff_is_sewn_to_both_sleeves():
@@ -471,6 +472,6 @@ def test_a_cuff_is_sewn_to_both_sleeves():
     seams = [seam("wrist", "sleeve.e1", "cuff.e3"), seam("over the arm", "sleeve.e3", "yoke.e1"), other]
     whole, sewn, _ = whole_pieces(pieces, seams)
     assert set(whole) == {"sleeve", "sleeve mirrored", "cuff", "cuff mirrored", "yoke"}
-    joined = [{side.piece for chain in each.sides for side in chain} for each in sewn]
+    joined = [{side.piece for side in each.stretches} for each in sewn]
     assert {"sleeve mirrored", "cuff mirrored"} in joined
     assert {"sleeve mirrored", "yoke"} in joined

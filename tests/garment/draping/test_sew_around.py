@@ -106,8 +106,8 @@ def test_a_shirt_is_sewn_by_its_seams_alone():
     """Around both arms in the end; one that lies beside its arm, or is crumpled, is refused."""
     pattern, body = shirt(), body_of_size(30.0)
     pieces = {each.name: each for each in pattern.pieces[""]}
-    meshes, welds = mesh_pieces(pieces, pattern.seams, 0.04)
-    openings = find_openings(sew_meshes(pieces, meshes, welds, fabric=warpflat.find_fabric("woven")))
+    meshed = mesh_pieces(pieces, pattern.seams, 0.04)
+    openings = find_openings(sew_meshes(meshed, warpflat.find_fabric("woven")))
     assert [each.length for each in openings] == pytest.approx([1.0, ARMHOLE, ARMHOLE, 0.36])
     assert [round(each.turn, 6) for each in openings[:3]] == [0.0, 0.0, 0.0]
     worn, _ = drape_pattern(

@@ -129,7 +129,7 @@ def test_a_cuff_is_closed_upon_itself():
     ((one, at), (other, its)) = closures({"cuff": cuff})[0]
     assert (one, other) == ("cuff", "cuff")
     np.testing.assert_allclose([at, its], [[0.24, 0.03], [0.0115, 0.03]])
-    meshes, welds = mesh_pieces({"cuff": cuff}, [], 0.01)
+    _, meshes, welds = mesh_pieces({"cuff": cuff}, [], 0.01)
     (((_, first), (_, second)),) = welds[-1]
     np.testing.assert_allclose(meshes["cuff"].points[[first, second]], [at, its])
     assert len(np.unique(meshes["cuff"].triangles)) == len(meshes["cuff"].points)
@@ -352,7 +352,7 @@ def test_strips_are_worn_right_side_out(run_against: bool):
     assert np.sign(pieces["cuff"].marks["button"][0]) == (1.0 if run_against else -1.0)
     # The seam of cuff and band is named rightly, so that the band follows.
     assert turned == (set() if run_against else {"cuff", "band"})
-    meshes, welds = mesh_pieces(pieces, left, 0.02)
+    _, meshes, welds = mesh_pieces(pieces, left, 0.02)
     begins = dict(zip(meshes, np.cumsum([0, *(len(mesh.points) for mesh in meshes.values())]).tolist(), strict=False))
     joints = [(begins[a] + i, begins[b] + j) for seam in welds for (a, i), *others in seam for b, j in others]
     count = sum(len(mesh.points) for mesh in meshes.values())
@@ -372,11 +372,11 @@ def test_a_fall_starts_turned_down_over_its_stand():
     seams = [joined("stand", "collar_stand.low", "shell.high"), joined("fall", "collar.low", "collar_stand.high")]
     pieces = {piece.name: piece for piece in (shell, stand, fall)}
     assert turned_down(pieces) == {"collar"}
-    meshes, welds = mesh_pieces(pieces, seams, 0.01)
-    flat = meshes["shell"].points
+    meshed = mesh_pieces(pieces, seams, 0.01)
+    flat = meshed.meshes["shell"].points
     placed = {"shell": np.column_stack([flat, np.zeros(len(flat))])}
     for turned, low, high in (((), 0.33, 0.38), ({"collar"}, 0.28, 0.33)):
-        found = continue_pieces(placed, meshes, welds, turned)
+        found = continue_pieces(placed, meshed, turned)
         assert np.sort(found["collar_stand"][:, 1])[[0, -1]] == pytest.approx([0.3, 0.33], abs=1e-6)
         assert np.sort(found["collar"][:, 1])[[0, -1]] == pytest.approx([low, high], abs=1e-6)
 
@@ -387,7 +387,8 @@ def test_the_halves_of_a_hood_start_beside_the_head():
     back = rectangle("back", 0.2, 0.3)
     half = rectangle("hood", 0.2, 0.3, role="hood")
     halves = {"hood": half, "hood mirrored": turn_over(half), "strip": rectangle("strip", 0.1, 0.3, role="hood")}
-    meshes, _ = mesh_pieces({"back": back, **halves}, [], 0.05)
+    meshed = mesh_pieces({"back": back, **halves}, [], 0.05)
+    meshes = meshed.meshes
     rows = {name: meshes[name].edges["low"] for name in halves}
     rows["hood mirrored"] = rows["hood mirrored"][::-1]
     places = np.column_stack(
@@ -398,10 +399,10 @@ def test_the_halves_of_a_hood_start_beside_the_head():
     around[low] = places
     across = np.array([-1.0, 1.0, 1.0])
     welds = [[[("hood", int(a)), ("back", int(b))] for a, b in zip(rows["hood"], low, strict=True)]]
-    found = hood_beside_head({"back": around}, meshes, welds, set(halves), 0.09)
+    found = hood_beside_head({"back": around}, meshed._replace(welds=welds), set(halves), 0.09)
     assert set(found) == {"hood"}
     others = [[[("hood mirrored", int(a)), ("back", int(b))] for a, b in zip(rows["hood mirrored"], low, strict=True)]]
-    found |= hood_beside_head({"back": around * across}, meshes, others, set(halves), 0.09)
+    found |= hood_beside_head({"back": around * across}, meshed._replace(welds=others), set(halves), 0.09)
     for name, side in (("hood", 1.0), ("hood mirrored", -1.0)):
         np.testing.assert_allclose(found[name][:, 0], 0.09 * side)
         np.testing.assert_allclose(np.ptp(found[name][:, 1:], axis=0), [0.3, 0.2])
@@ -411,7 +412,7 @@ def test_the_halves_of_a_hood_start_beside_the_head():
         [("strip", int(k)), ("back", int(b))] for k, b in zip(rows["strip"], low[: len(rows["strip"])], strict=False)
     ]
     middle = around - [0.5 * (places[: len(strip), 0].min() + places[: len(strip), 0].max()), 0.0, 0.0]
-    assert not hood_beside_head({"back": middle}, meshes, [strip], set(halves), 0.09)
+    assert not hood_beside_head({"back": middle}, meshed._replace(welds=[strip]), set(halves), 0.09)
 
 
 def test_a_drape_begins_in_one_layer_right_side_out_with_its_collar_turned_down():

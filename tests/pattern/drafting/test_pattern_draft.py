@@ -87,7 +87,7 @@ def test_notches_stand_at_the_same_length_on_both_sides_of_every_seam(dress):
         for seam, report in zip(dress.garment.seams, (r for r in dress.seams if r.size == size), strict=True):
             sides = []
             for side, total in zip(seam.sides, report.length_mm, strict=True):
-                on_side = {(s.piece, s.edge) for s in side}
+                on_side = {s.place for s in side}
                 marks = [n for p in pieces for n in p.notches if n.seam == seam.name and (p.name, n.edge) in on_side]
                 sides.append(sorted((n.length * 1000 / total, n.double) for n in marks))
             first, second = sides

@@ -18,11 +18,6 @@ from warpflat.pattern.drafting.pieces import Pattern, Piece
 from warpflat.pattern.export.svg import write_marker_svg
 
 
-@pytest.fixture(scope="module")
-def dress():
-    return draft_garment(sample_dress(("36", "38")))
-
-
 @pytest.fixture(scope="module", params=[False, True], ids=["two_way", "one_way"])
 def marker(dress, request):
     return make_marker(dress, Cloth(width=1.4, one_way=request.param), sizes={"38": 1}, seconds=1), request.param

@@ -399,10 +399,10 @@ def test_panels_hang_where_the_body_is():
                 for k in ks]  # fmt: skip
     pattern = garmentcode_pattern(file_of(panels, stitches), "p")
     pieces, seams, _ = whole_pieces(pattern.pieces[""], pattern.seams)
-    meshes, welds = mesh_pieces(pieces, seams, 0.03)
+    meshed = mesh_pieces(pieces, seams, 0.03)
     body = warpflat.Mannequin.from_size("EU 38", resolution_mm=30.0)
-    cloth = sew_meshes(pieces, meshes, welds, fabric=warpflat.find_fabric("woven"))
-    laid = lay_pieces(cloth, pieces, meshes, find_openings(cloth), body)
+    cloth = sew_meshes(meshed, warpflat.find_fabric("woven"))
+    laid = lay_pieces(cloth, meshed, find_openings(cloth), body)
     assert {limb for limb in laid.limbs if limb} == {"left arm", "right arm"}
     # The skirt, a garment of its own, keeps its height, which is that of the waist at its upper edge.
     skirts = np.unique(np.concatenate([cloth.welded[cloth.piece_vertices[f"skirt_{side}"]] for side in "fb"]))

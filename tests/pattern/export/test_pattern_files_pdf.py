@@ -13,7 +13,6 @@ import pytest
 import shapely
 from PIL import Image
 from pypdf import PdfReader
-from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
 from warpflat.pattern.drafting.draft import draft_garment
@@ -26,11 +25,6 @@ from warpflat.pattern.export.pdf_tiling import LEGEND_SIZE
 
 needs_poppler = pytest.mark.skipif(shutil.which("pdftoppm") is None, reason="pdftoppm (poppler) is not installed")
 MM = 1 / 25.4
-
-
-@pytest.fixture(scope="module")
-def dress():
-    return draft_garment(sample_dress(("36", "38")))
 
 
 @pytest.fixture(scope="module")

@@ -10,21 +10,14 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
-from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
-from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.marker import Cloth, make_marker
 from warpflat.pattern.export.pattern_json import pattern_json, write_pattern_json
 from warpflat.pattern.export.svg import STYLE, write_marker_svg, write_svg
 
 SVG = "{http://www.w3.org/2000/svg}"
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-
-
-@pytest.fixture(scope="module")
-def dress():
-    return draft_garment(sample_dress(("36", "38")))
 
 
 @pytest.fixture(scope="module")

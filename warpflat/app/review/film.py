@@ -32,6 +32,7 @@ from warpflat.flat import triangulate
 from warpflat.pattern import (
     DRAFTED,
     DRAFTED_CLOTH,
+    LEAST_GAP,
     SKIN,
     Scale,
     VertexColours,
@@ -50,7 +51,7 @@ _VERTEX = 5
 _COLOURS = 256
 #: Maps beside energy and strain, by the name of their primvar: unit on the page, how many of these the file's unit is, and the least
 #: upper end of a scale.
-MAPS: Mapping[str, tuple[str, float, float]] = {"pressure": ("Pa", 1.0, 10.0), "gap": ("mm", 1e3, 5.0)}
+MAPS: Mapping[str, tuple[str, float, float]] = {"pressure": ("Pa", 1.0, 10.0), "gap": ("mm", 1e3, LEAST_GAP)}
 # No value of a map is larger.
 _MOST_OF_MAP = 1e9
 # A body of more vertices than these is not shown.
@@ -105,20 +106,19 @@ class FilmPiece:
                 state = str(attribute.GetCustomData().get("state", ""))
                 self.maps[key] = np.array(attribute.Get(), dtype=np.float64), state
 
-    def shape(self, time: int) -> Shape:
-        """Return the topology at a frame."""
-        counts = np.asarray(self._pattern.GetFaceVertexCountsAttr().Get(time))
-        corners = np.array(self._pattern.GetFaceVertexIndicesAttr().Get(time), dtype=np.int32)
-        on_surface = np.array(self._surface.GetFaceVertexIndicesAttr().Get(), dtype=np.int32)
-        space = np.array(self._surface.GetPointsAttr().Get(), dtype=np.float64)
-        origin = np.zeros(int(corners.max()) + 1, dtype=np.int32)
-        origin[corners] = on_surface
-        return Shape(faces=_faces(counts, corners), surface=space[origin])
-
     @cached_property
     def shapes(self) -> list[Shape]:
         """The topologies, one after the other."""
-        return [self.shape(change) for change in self.changes]
+        on_surface = np.array(self._surface.GetFaceVertexIndicesAttr().Get(), dtype=np.int32)
+        space = np.array(self._surface.GetPointsAttr().Get(), dtype=np.float64)
+        shapes = []
+        for time in self.changes:
+            counts = np.asarray(self._pattern.GetFaceVertexCountsAttr().Get(time))
+            corners = np.array(self._pattern.GetFaceVertexIndicesAttr().Get(time), dtype=np.int32)
+            origin = np.zeros(int(corners.max()) + 1, dtype=np.int32)
+            origin[corners] = on_surface
+            shapes.append(Shape(faces=_faces(counts, corners), surface=space[origin]))
+        return shapes
 
     def number(self, time: int) -> int:
         """Return the number of the topology at a frame."""

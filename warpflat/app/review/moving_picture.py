@@ -56,10 +56,8 @@ def write_moving_pictures(folder: Path, *, film: bool, sheet: bool) -> list[str]
         pieces = open_film(folder / "frames.usdc")
         if film:
             images = _images(pieces, _evenly(pieces[0].times, _FRAMES), _LONG_SIDE)
-            count = len(images)
-            # The last frame stays for a moment.
-            durations = [round(1000 * len(pieces[0].times) / _RATE / count)] * (count - 1) + [1500]
-            write_moving_picture(folder / "film.webp", images, durations)
+            each = round(1000 * len(pieces[0].times) / _RATE / len(images))
+            write_moving_picture(folder / "film.webp", images, each=each, last=1500)
             written.append("film.webp")
         if sheet:
             columns, rows = _SHEET

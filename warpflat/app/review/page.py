@@ -24,7 +24,9 @@ from warpflat.core import (
     guarded,
     latest_file,
     open_file,
+    output_folder,
     read_result,
+    record_file,
     recorded_files,
     report_activity,
 )
@@ -75,8 +77,6 @@ def review_folder(folder: str | Path) -> Path:
     Raises:
         InputError: the folder holds no run, a file of it cannot be read, or the page cannot be written.
     """
-    from warpflat.core import output_folder, record_file
-
     folder = Path(folder)
     metrics, files, name = read_run(folder)
     with output_folder(folder, ["review.html"], guard=True):
@@ -128,8 +128,8 @@ def write_review(
     name: str,
     film: Mapping[str, Any] | None,
     pictures: Mapping[str, str] | None = None,
-) -> str:
-    """Write `review.html` and return its name.
+) -> None:
+    """Write `review.html`.
 
     Args:
         folder: of the run.
@@ -147,7 +147,6 @@ def write_review(
     page = _page(folder, metrics, files, name, film, pictures or {})
     with atomic_path(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
-    return path.name
 
 
 def _page(

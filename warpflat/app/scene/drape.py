@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpflat.app.scene.frames import FrameSchedule
 from warpflat.app.scene.load import Scene, errors_named
 from warpflat.app.scene.schema import DrapeTable
 from warpflat.core import report_activity
@@ -27,7 +26,7 @@ def drape_names(scene: Scene) -> list[str]:
     names = [f"{scene.name}.draped.obj"] if settings.mannequin is None else []
     names += ["drape.png"] if output.picture else []
     names += ["worn.usdc"] if table.usd else []
-    names += ["drape.webp"] if output.picture and FrameSchedule(output).wanted else []
+    names += ["drape.webp"] if output.picture and output.frames > 0 else []
     if table.correct or table.correct_fabric is not None:
         names += ["corrected.png"] if output.picture else []
         names += pattern_names(f"{scene.name}.corrected", _corrected_formats(scene))
@@ -62,9 +61,7 @@ def write_drape(
     output = scene.settings.output
     table = scene.settings.drape
     assert table is not None
-    files = write_drape_files(
-        draped, folder, picture=output.picture, frames=FrameSchedule(output).wanted, usd=table.usd
-    )
+    files = write_drape_files(draped, folder, picture=output.picture, frames=output.frames > 0, usd=table.usd)
     metrics = {"drape": draped.measures()}
     if table.correct or table.correct_fabric is not None:
         # Correct the pattern, and write it beside the first.

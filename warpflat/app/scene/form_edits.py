@@ -217,11 +217,7 @@ def _shares(dart: FormDart, garment: FormGarment) -> Mapping[str, tuple[str, flo
         parts = [part for part in piece.edges if piece.parts.get(part, part) == edge]
         length = sum(polyline_length(garment.pieces[name].positions[piece.edges[part]]) for part in parts)
         seam = next(
-            (
-                s.name
-                for s in seams
-                if any(side.piece == name and side.edge in parts for row in s.sides for side in row)
-            ),
+            (s.name for s in seams if any(side.piece == name and side.edge in parts for side in s.stretches)),
             None,
         )
         if seam is None:

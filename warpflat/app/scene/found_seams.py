@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.app.scene.frames import FrameSchedule
 from warpflat.app.scene.load import Scene, errors_named, expand_variables, scene_fabric
 from warpflat.app.scene.schema import FileSurface, SeamCutTable
 from warpflat.app.scene.surface import scene_surface
@@ -84,7 +83,7 @@ def found_seams(scene: Scene) -> FoundSeams | None:
         raise
     layers: Sequence[Surface] = read.layers
     # Before anything is tried on it, or read again.
-    require_memory_for_run(sum(len(layer.vertices) for layer in layers), frames=FrameSchedule(settings.output).wanted)
+    require_memory_for_run(sum(len(layer.vertices) for layer in layers), frames=settings.output.frames > 0)
     seams, taken, notes = file_seams(read.raw), None, list[str]()
     if asked is not None and of_file:
         wanted = FILE_SEAMS if asked.find == "file" else (asked.find,)

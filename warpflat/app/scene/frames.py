@@ -8,10 +8,10 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import chain, pairwise, repeat
 from pathlib import Path
 from tempfile import TemporaryFile
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 import numpy as np
@@ -273,17 +273,16 @@ class Film:
         self.worn: Mapping[str, Flattening] = {}
         self.drafted: Sequence[Surface] = ()
         self._mannequin = mannequin
-        self._stack = ExitStack()
+        self._open = ExitStack()
+        self._keys: KeyFile | None = None
         self._folder, self._output = folder, output
         self._most = max(_MOST_VERTICES // max(sum(len(surface.vertices) for surface in surfaces), 1), 3)
-        self.wanted = FrameSchedule(output).wanted
+        self.wanted = output.frames > 0
         self._surfaces = {surface.name: surface for surface in surfaces}
         vertices = sum(len(surface.vertices) for surface in surfaces)
         self._all_stored = not output.compact_film and vertices * max(output.frames, 1) <= _MOST_STORED
-        self.recorders = {name: FrameRecorder(surface, self._schedule) for name, surface in self._surfaces.items()}
-
-    def _schedule(self) -> FrameSchedule:
-        return FrameSchedule(self._output, at_most=self._most)
+        schedule = partial(FrameSchedule, output, at_most=self._most)
+        self.recorders = {name: FrameRecorder(surface, schedule) for name, surface in self._surfaces.items()}
 
     def __enter__(self) -> Film:
         """Open the file of layouts. The USD library, which takes a while to load, is not needed before the end.
@@ -292,23 +291,19 @@ class Film:
             InputError: the place cannot be written.
         """
         if self.wanted:
-            with optional_file(self._folder / "frames.usdc", []), ExitStack() as stack:
-                self._keys = stack.enter_context(KeyFile(self._folder))
+            with optional_file(self._folder / "frames.usdc", []):
+                self._keys = self._open.enter_context(KeyFile(self._folder))
                 for recorder in self.recorders.values():
                     recorder.keys = self._keys
-                stack.push(self._write_at_end)
-                self._stack = stack.pop_all()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Write the frames if the block ended well, and close the files."""
-        self._stack.__exit__(kind, error, trace)
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """Write the frames if the block ended well, and close the file of layouts."""
+        with self._open:
+            if kind is None and self._keys is not None and not self._keys.failed:
+                self._write()
 
-    def _write_at_end(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is not None or self._keys.failed:
-            return
+    def _write(self) -> None:
         with optional_file(self._folder / "frames.usdc", self.files) as path:
             from warpflat.pattern import SMALLEST_SCALE, FrameWriter, film_scale
 
@@ -549,11 +544,6 @@ class FrameSchedule:
         self._every = output.frame_every
         self._number = output.frames if at_most is None else min(output.frames, at_most)
         self._next = 0
-
-    @property
-    def wanted(self) -> bool:
-        """True if any frame is written."""
-        return self._number > 0
 
     @property
     def is_even(self) -> bool:

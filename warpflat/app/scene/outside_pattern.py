@@ -362,7 +362,7 @@ def drape_outside(
     """
     import warp as wp
 
-    from warpflat.core import optional_file, output_folder, remove_stale, report_activity, require_own_metrics
+    from warpflat.core import optional_file, output_folder, remove_stale, report_activity
     from warpflat.flat import run_metrics
     from warpflat.garment import (
         DrapeOptions,
@@ -384,7 +384,6 @@ def drape_outside(
     if correct:
         names += ["corrected.png", f"{job.name}.corrected.dxf", f"{job.name}.corrected.svg"]
     with output_folder(out, names, sources=job.sources, guard=True) as folder:
-        require_own_metrics(folder)
         report_activity("draping")
         with errors_named(str(job.path)):
             lifts = job.lifts if size in (None, pattern.sample) else {}

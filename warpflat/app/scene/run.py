@@ -15,7 +15,7 @@ from warpflat.app.review.page import pack_frames, pack_pictures, write_review
 from warpflat.app.scene.cuts import CutSequence
 from warpflat.app.scene.drape import drape_names, write_drape
 from warpflat.app.scene.form_shaping import ClosedDarts, require_open_darts, settle_shape
-from warpflat.app.scene.frames import MANNEQUIN, Film, FrameSchedule
+from warpflat.app.scene.frames import MANNEQUIN, Film
 from warpflat.app.scene.load import Scene
 from warpflat.app.scene.plan import GarmentPlan, MeshPlan, plan_scene
 from warpflat.app.scene.schema import FileSurface
@@ -30,7 +30,6 @@ from warpflat.core import (
     remove_stale,
     report_activity,
     require_memory_for_run,
-    require_own_metrics,
 )
 from warpflat.flat import Progress, Remedy, Surface, judge, size_words
 from warpflat.garment import (
@@ -99,7 +98,6 @@ def run_scene(
     """
     sources = (*scene.sources, *(() if cuts is None else cuts.surface.sources))
     with output_folder(out, files_of_run(scene), sources=sources, guard=True) as folder:
-        require_own_metrics(folder)
         settled, notes = settle_shape(scene, device=device)
         form = built() if built is not None and settled is scene else None
         while True:
@@ -121,7 +119,7 @@ def files_of_run(scene: Scene) -> list[str]:
     asked = {
         "metrics.json": True,
         f"{scene.name}.obj": alone,
-        "frames.usdc": FrameSchedule(output).wanted,
+        "frames.usdc": output.frames > 0,
         "picture.png": output.picture,
         "review.html": output.picture and output.review,
         "wear.png": worn and on_form,
@@ -146,7 +144,7 @@ def _run(
     scene, settings, output = plan.scene, plan.scene.settings, plan.scene.settings.output
     names = [surface.name for surface in plan.surfaces]
     vertices = sum(len(surface.vertices) for surface in plan.surfaces)
-    filmed, body = FrameSchedule(output).wanted, plan.mannequin
+    filmed, body = output.frames > 0, plan.mannequin
     expect_files(folder, [f"{name}.obj" for name in names])
     expect_files(folder, [MANNEQUIN] if filmed and body is not None else [])
     expect_files(folder, [f"{name}.draped.obj" for name in names] if settings.drape is not None else [])

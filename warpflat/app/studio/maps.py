@@ -11,7 +11,7 @@ from warpflat.app.studio.frame import PieceFrame
 from warpflat.core import FloatArray, IntArray
 from warpflat.flat import shear_angles
 from warpflat.garment import Drape
-from warpflat.pattern import SMALLEST_SCALE, Scale, VertexColours, energy_scale, face_areas
+from warpflat.pattern import LEAST_GAP, SMALLEST_SCALE, Scale, VertexColours, energy_scale, face_areas
 
 __all__ = ["MAPS", "MapScale", "drape_gaps", "drape_scale", "face_values", "piece_scale", "vertex_values"]
 
@@ -25,7 +25,6 @@ MAPS: Mapping[str, str] = {
 }
 # A map of less than this shows nothing [%, degrees].
 _LEAST_STRAIN = 0.01
-_LEAST_GAP = 5.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +71,7 @@ def drape_gaps(drape: Drape, piece: str) -> FloatArray:
 
 def drape_scale(drape: Drape) -> MapScale:
     """Return the scale of the gap, which ends at a whole number."""
-    widest = Scale.from_zero(1e3 * drape.gap, drape.areas, _LEAST_GAP).high
+    widest = Scale.from_zero(1e3 * drape.gap, drape.areas, LEAST_GAP).high
     return MapScale(kind="drape", high=float(np.ceil(widest)), colours="YlOrRd")
 
 

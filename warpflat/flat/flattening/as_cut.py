@@ -15,10 +15,9 @@ from warpflat.flat.fabric.fabric import Fabric
 from warpflat.flat.flattening.datum import resolve_datum
 from warpflat.flat.flattening.develop import Development
 from warpflat.flat.flattening.flatten_piece import check_settings
-from warpflat.flat.flattening.progress import Stage
+from warpflat.flat.flattening.progress import laid_stage
 from warpflat.flat.flattening.result import Flattening
 from warpflat.flat.model.network import SpringNetwork
-from warpflat.flat.model.strain import strain_energy
 from warpflat.flat.solver.options import RelaxOptions
 from warpflat.flat.solver.steps import Relaxation
 from warpflat.flat.surface.mesh import Surface
@@ -68,17 +67,7 @@ def laid_as_cut(surface: Surface, cut: FloatArray, *, fabric: Fabric, device: st
     settings = check_settings(fabric, grain_angle=0.0, model="auto", wear=None, relax=None, device=device)
     network = SpringNetwork.build(surface, settings.fabric, cut, device=settings.device)
     energies = Relaxation(network, RelaxOptions(), start=cut).energies()
-    stage = Stage(
-        name="as cut",
-        model_energy_j=energies.potential,
-        guard_energy_j=energies.guard,
-        strain_energy_j=strain_energy(network, cut),
-        steps=0,
-        work_units=0.0,
-        seconds=time.perf_counter() - begun,
-        converged=True,
-        residual=None,
-    )
+    stage = laid_stage("as cut", network, cut, energies, seconds=time.perf_counter() - begun)
     return Flattening(
         surface=surface,
         fabric=settings.fabric,

@@ -20,14 +20,13 @@ from warpflat.flat.fabric.library import as_fabric
 from warpflat.flat.flattening.datum import resolve_datum
 from warpflat.flat.flattening.develop import Development, flat_layout, turn_upright
 from warpflat.flat.flattening.keep_apart import keep_apart
-from warpflat.flat.flattening.progress import Progress, Stage
+from warpflat.flat.flattening.progress import Progress, laid_stage
 from warpflat.flat.flattening.relax_piece import relax_piece
 from warpflat.flat.flattening.relaxation_task import RelaxationTask
 from warpflat.flat.flattening.result import Flattening
 from warpflat.flat.flattening.start import choose_start, given_start
 from warpflat.flat.model.membrane import ModelChoice, check_model, choose_model
 from warpflat.flat.model.network import SpringNetwork
-from warpflat.flat.model.strain import strain_energy
 from warpflat.flat.model.wear import Wear, unused_stretch
 from warpflat.flat.solver.collapse import iterate_coarsenings
 from warpflat.flat.solver.options import RelaxOptions, given_options
@@ -253,17 +252,7 @@ def relax_developed(piece: DevelopedPiece) -> Flattening:
         direction_updates=task.max_direction_updates(mended=development.mended),
         needs_isotropic_start=task.needs_isotropic_start(development),
     )
-    developed = Stage(
-        name="develop",
-        model_energy_j=end.begin.potential,
-        guard_energy_j=end.begin.guard,
-        strain_energy_j=strain_energy(piece.network, development.positions),
-        steps=0,
-        work_units=0.0,
-        seconds=piece.seconds,
-        converged=True,
-        residual=None,
-    )
+    developed = laid_stage("develop", piece.network, development.positions, end.begin, seconds=piece.seconds)
     positions, stages = keep_apart(task, end, development.positions, np.empty(0, dtype=np.int32))
     return Flattening(
         surface=task.surface,

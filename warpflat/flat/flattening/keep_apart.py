@@ -7,7 +7,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.flat.flattening.conformal_layout import conformal_layout
 from warpflat.flat.flattening.harmonic_layout import harmonic_layout
-from warpflat.flat.flattening.progress import CONTACT, Stage
+from warpflat.flat.flattening.progress import CONTACT, Stage, make_stage, make_stages
 from warpflat.flat.flattening.relaxation_task import RelaxationTask, RelaxedPiece
 from warpflat.flat.solver.contact import open_cracks, relax_with_contact, swirl
 from warpflat.flat.solver.grain import grain_alignments
@@ -54,7 +54,7 @@ def keep_apart(
         The layout, #V by 2 [m], and the stages: those of the relaxation, and "contact" if there was one that succeeded.
     """
     surface, network, free = end.network.surface, end.network, end.positions
-    stages = task.make_stages(network, free, end.outcome)
+    stages = make_stages(task.stage_name, network, free, end.outcome)
     relaxed = stages[-1]
     overlap = overlap_area(surface, free, cut_sides) if task.options.gap_mm and not task.stopped else 0.0
     if overlap == 0.0:
@@ -89,7 +89,7 @@ def keep_apart(
             after = outcome.energies.potential
             share = f" ({100 * (after - before) / before:+.2g} %)" if after < 2.0 * before else ""
             task.notes.append(f"{words}; contact has parted it, at a price of {1e3 * (after - before):.3g} mJ{share}")
-            return state.positions(), (*stages, task.make_stage(network, state.positions(), outcome, name=CONTACT))
+            return state.positions(), (*stages, make_stage(CONTACT, network, state.positions(), outcome))
         if outcome is not None and len(surface.vertices) > _MOST_SWIRLED:
             task.notes.append(
                 f"{words}, and contact could not part it in {outcome.steps:,} iterations: cut it apart there, or make the mesh coarser"

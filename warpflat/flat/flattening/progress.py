@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
+
+import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.text import energy_words, format_count
 from warpflat.flat.model.network import SpringNetwork
-from warpflat.flat.model.strain import WornStrain, worn_strain
+from warpflat.flat.model.strain import WornStrain, strain_energy, worn_strain
 from warpflat.flat.solver.steps import Relaxation
-from warpflat.flat.solver.stop import Remainder
+from warpflat.flat.solver.stop import Energies, Outcome, Remainder
 from warpflat.flat.surface.mesh import Surface
 
-__all__ = ["CONTACT", "STEPS", "Progress", "Stage", "relaxation_words"]
+__all__ = ["CONTACT", "STEPS", "Progress", "Stage", "laid_stage", "make_stage", "make_stages", "relaxation_words"]
 
 #: Name of the stage in which a piece that would lie over itself is kept from it.
 CONTACT = "contact"
@@ -54,6 +56,39 @@ class Stage:
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of `stages` in `metrics.json`."""
         return self.__dict__ | {"left": None if self.left is None else dict(self.left.__dict__)}
+
+
+def laid_stage(
+    name: str,
+    network: SpringNetwork,
+    layout: FloatArray,
+    energies: Energies,
+    *,
+    seconds: float = 0.0,
+    converged: bool = True,
+) -> Stage:
+    """Make the entry of the history for a layout (#V by 2 [m]) to which nothing was relaxed."""
+    return Stage(
+        name=name, model_energy_j=energies.potential, guard_energy_j=energies.guard, strain_energy_j=strain_energy(network, layout),
+        steps=0, work_units=0.0, seconds=seconds, converged=converged, residual=None,
+    )  # fmt: skip
+
+
+def make_stage(name: str, network: SpringNetwork, layout: FloatArray, outcome: Outcome) -> Stage:
+    """Make the entry of the history for a relaxation that has ended in a layout (#V by 2 [m])."""
+    return replace(
+        laid_stage(name, network, layout, outcome.energies, seconds=outcome.seconds, converged=outcome.converged),
+        steps=outcome.steps, work_units=outcome.work_units, residual=None if np.isnan(outcome.residual) else outcome.residual,
+        left=outcome.left,
+    )  # fmt: skip
+
+
+def make_stages(name: str, network: SpringNetwork, layout: FloatArray, outcome: Outcome) -> tuple[Stage, ...]:
+    """Make the entries of the history for a relaxation: of the paper's first steps, if there were any, and its own."""
+    relaxed = make_stage(name, network, layout, outcome)
+    if outcome.first_steps is None or outcome.first_layout is None:
+        return (relaxed,)
+    return make_stage(STEPS, network, outcome.first_layout, outcome.first_steps), relaxed
 
 
 def relaxation_words(pieces: Iterable[Sequence[Mapping[str, Any]]]) -> str:

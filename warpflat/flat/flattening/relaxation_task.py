@@ -12,10 +12,9 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.flat.fabric.fabric import DEFAULT_FABRIC, Fabric, grain_axes
 from warpflat.flat.fabric.library import as_fabric
 from warpflat.flat.flattening.develop import Development
-from warpflat.flat.flattening.progress import STEPS, Progress, Stage
+from warpflat.flat.flattening.progress import Progress
 from warpflat.flat.model.membrane import Model
 from warpflat.flat.model.network import SpringNetwork
-from warpflat.flat.model.strain import strain_energy
 from warpflat.flat.model.wear import Wear, intended_stretch
 from warpflat.flat.solver.options import RelaxOptions
 from warpflat.flat.solver.steps import Relaxation
@@ -124,30 +123,6 @@ class RelaxationTask:
         if self.callback is not None:
             answer = self.callback(Progress(stage, state, max_steps=self.options.max_steps))
             self.stopped = self.stopped or answer is True
-
-    def make_stages(self, network: SpringNetwork, positions: FloatArray, outcome: Outcome) -> tuple[Stage, ...]:
-        """Make the entries of the history for a relaxation: of the paper's first steps, if there were any, and its own."""
-        relaxed = self.make_stage(network, positions, outcome)
-        if outcome.first_steps is None or outcome.first_layout is None:
-            return (relaxed,)
-        return self.make_stage(network, outcome.first_layout, outcome.first_steps, name=STEPS), relaxed
-
-    def make_stage(
-        self, network: SpringNetwork, positions: FloatArray, outcome: Outcome, *, name: str | None = None
-    ) -> Stage:
-        """Make the entry of the history for the stage that has ended with an outcome, by default the task's own."""
-        return Stage(
-            name=name or self.stage_name,
-            model_energy_j=outcome.energies.potential,
-            guard_energy_j=outcome.energies.guard,
-            strain_energy_j=strain_energy(network, positions),
-            steps=outcome.steps,
-            work_units=outcome.work_units,
-            seconds=outcome.seconds,
-            converged=outcome.converged,
-            residual=None if np.isnan(outcome.residual) else outcome.residual,
-            left=outcome.left,
-        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,9 +14,8 @@ import numpy as np
 from warpflat.core.arrays import IntArray
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.flat.flattening.harmonic_layout import harmonic_layout
-from warpflat.flat.flattening.progress import Stage
+from warpflat.flat.flattening.progress import laid_stage
 from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.model.strain import strain_energy
 from warpflat.flat.solver.steps import Relaxation
 from warpflat.flat.surface.connectivity import border_loops
 from warpflat.flat.surface.triangles import triangulate
@@ -151,17 +150,7 @@ def cut_straight(piece: Flattening, band: Band, *, shorter: float = 0.0) -> Flat
     if not (piece.network.cell_arrays.least_shares(laid) > 0.0).all():
         return None
     energies = Relaxation(piece.network, piece.options, start=laid).energies()
-    stage = Stage(
-        name="straight",
-        model_energy_j=energies.potential,
-        guard_energy_j=energies.guard,
-        strain_energy_j=strain_energy(piece.network, laid),
-        steps=0,
-        work_units=0.0,
-        seconds=0.0,
-        converged=piece.converged,
-        residual=None,
-    )
+    stage = laid_stage("straight", piece.network, laid, energies, converged=piece.converged)
     longer = max(band.lengths) / length - 1.0
     note = f"cut straight, {1e3 * length:.0f} x {1e3 * band.width:.0f} mm, and worn stretched by up to {100 * longer:.0f} %"
     limit = piece.fabric.strain_limit

@@ -7,6 +7,8 @@ and an edge may have any number of faces: the same functions check a mesh that c
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -25,6 +27,7 @@ from warpflat.flat.surface.mesh import Surface, once_per_faces
 __all__ = [
     "border_loops",
     "border_of",
+    "chain_lines",
     "coincident_vertices",
     "components",
     "components_of",
@@ -151,6 +154,31 @@ def border_loops(faces: ArrayLike | HalfEdges, vertices: FloatArray | None = Non
         return float(len(loop)) if vertices is None else polyline_length(vertices[loop], closed=True)
 
     return sorted(loops, key=length, reverse=True)
+
+
+def chain_lines(parts: Sequence[Sequence[int]]) -> list[list[int]]:
+    """Return rows of vertices, such as edges, joined end to end where exactly two ends meet; a closed one repeats its first vertex."""
+    ends: dict[int, list[int]] = {}
+    for number, part in enumerate(parts):
+        for vertex in {part[0], part[-1]}:
+            ends.setdefault(vertex, []).append(number)
+    left = dict(enumerate(parts))
+    chains = []
+    for number in range(len(parts)):
+        if number not in left:
+            continue
+        joined = list(left.pop(number))
+        for _ in range(2):
+            while joined[0] != joined[-1]:
+                meeting = ends.get(joined[-1], [])
+                follow = [n for n in meeting if n in left]
+                if len(meeting) != 2 or not follow:
+                    break
+                part = left.pop(follow[0])
+                joined += (part if part[0] == joined[-1] else part[::-1])[1:]
+            joined.reverse()
+        chains.append(joined)
+    return chains
 
 
 def border_of(surface: Surface) -> IntArray:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from warpflat.core import FloatArray, IntArray, guarded, polyline_length
+from warpflat.core import FloatArray, IntArray, guarded
 from warpflat.flat import (
     DEFAULT_FABRIC,
     CutPattern,
@@ -58,12 +58,8 @@ def garment_as_cut(
         surface.name: laid_as_cut(surface, panel.cut, fabric=fabric, device=device)
         for panel, surface in zip(panels, surfaces, strict=True)
     }
-    seams = []
-    for pair in meeting_borders({surface.name: surface for surface in surfaces}):
-        one, other = (
-            polyline_length(pieces[piece].positions[row]) for piece, row in zip(pair.pieces, pair.vertices, strict=True)
-        )
-        seams.append(replace(pair, sides=pair.pieces, ratio=one / other, eased=True))
+    borders = meeting_borders({surface.name: surface for surface in surfaces})
+    seams = [replace(pair.as_laid(pieces), sides=pair.pieces) for pair in borders]
     compared = CutPattern(
         unit=panels[0].unit,
         area_ratio=sum(panel.area for panel in panels) / sum(panel.worn_area for panel in panels),
@@ -143,7 +139,11 @@ def worn_at(worn: Mapping[str, tuple[FloatArray, IntArray]], seams: Sequence[Sea
     group = {name: {name} for name in side}
     for seam in seams:
         a, b = (chain[0].piece for chain in seam.sides)
-        if a in group and b in group and side[a] == side[b] and _turned_apart(vector[a], vector[b]):
+        if a not in group or b not in group or side[a] != side[b]:
+            continue
+        # They face more away from each other than alike.
+        one, other = vector[a].sum(axis=0), vector[b].sum(axis=0)
+        if float(one @ other) < 0.5 * float(np.linalg.norm(one) * np.linalg.norm(other)):
             both = group[a] | group[b]
             group |= dict.fromkeys(both, both)
     at = {}
@@ -165,9 +165,3 @@ def worn_at(worn: Mapping[str, tuple[FloatArray, IntArray]], seams: Sequence[Sea
         ):
             at[name] = f"{which} arm"
     return at
-
-
-def _turned_apart(one: FloatArray, other: FloatArray) -> bool:
-    """Return whether two pieces face more away from each other than alike."""
-    a, b = one.sum(axis=0), other.sum(axis=0)
-    return float(a @ b) < 0.5 * float(np.linalg.norm(a) * np.linalg.norm(b))

@@ -14,6 +14,7 @@ from warpflat.core import InputError, part_between, polyline_length
 from warpflat.garment.construction.button_stand import buttonhole
 from warpflat.garment.construction.edges import (
     Place,
+    added,
     bezier,
     copies_sewn,
     direction,
@@ -23,7 +24,6 @@ from warpflat.garment.construction.edges import (
     lengths_of,
     new_piece,
     sewn,
-    with_pieces,
 )
 from warpflat.garment.construction.free_edges import (
     OFF_END,
@@ -102,6 +102,8 @@ def with_collar(
     Raises:
         InputError: the neckline is closed or opens behind, where the collar needs an opening in front, or the collar cannot be drawn.
     """
+    import shapely
+
     closed = any(chain.closed for chain, _ in free_chains(pattern, places, gaps, breaks))
     if closed and collar.style != "flat":
         raise InputError(
@@ -123,50 +125,55 @@ def with_collar(
         )
     if collar.style in ("stand", "shirt"):
         return _with_stand(pattern, chains[0], collar)
-    draw = _flat_edges if collar.style == "flat" else _convertible_edges
-    name, quantity = free_piece_name(pattern, "collar"), 4 if halves else 2
-    made = [
-        _piece(pattern, name, size, draw(pattern, chains[0], collar, size), quantity=quantity, paired=halves)
-        for size in pattern.pieces
-    ]
-    pattern = _sewn_on(with_pieces(pattern, made), chains[0], name)
+    name, chain = free_piece_name(pattern, "collar"), chains[0]
+
+    def draw(like: Piece) -> Piece:
+        length, allowance = chain_length(pattern, chain, like.size), chain_allowance(pattern, chain, like.size)
+        if collar.style == "flat":
+            # Around the neckline, with round corners.
+            line = joined_line(pattern, chain, like.size, lapped=_LAPPED)
+            line = line * (length / drawn_length(line))
+            outer = np.asarray(shapely.LineString(line).offset_curve(collar.width).simplify(2e-5).coords)
+            edges = strip_edges(line, outer, rounded=_ROUND * collar.width, allowance=allowance)
+        else:
+            back, grown = _rests_on(pattern, chain, like.size, (1.0 - 2.0 * _STANDS) * collar.width)
+            shape = _turned_down(length, collar.width, grown / back, collar.point + _STANDS * collar.width)
+            edges = shape.edges(allowance=allowance)
+        return _piece(name, like, edges, quantity=4 if halves else 2, paired=halves)
+
+    pattern = _sewn_on(added(pattern, draw), chain, name)
     if halves:
         other = SeamSide(piece=name, edge="lower", reversed=True, mirrored=True)
         pattern = sewn(pattern, "collar of the other half", other, chains[1].sides)
     return pattern
 
 
-def _flat_edges(pattern: Pattern, chain: FreeChain, collar: Collar, size: str) -> list[Edge]:
-    """Return the edges of a collar that lies flat around a neckline, with round corners."""
-    import shapely
+def _turned_down(length: float, high: float, longer: float, tip: float) -> Strip:
+    """Return a collar of a length and a height [m] that is turned down: so many times as long outside as where it turns.
 
-    line = joined_line(pattern, chain, size, lapped=_LAPPED)
-    line = line * (chain_length(pattern, chain, size) / drawn_length(line))
-    outer = np.asarray(shapely.LineString(line).offset_curve(collar.width).simplify(2e-5).coords)
-    return strip_edges(line, outer, rounded=_ROUND * collar.width, allowance=chain_allowance(pattern, chain, size))
-
-
-def _convertible_edges(pattern: Pattern, chain: FreeChain, collar: Collar, size: str) -> list[Edge]:
-    """Return the edges of a collar in one with its stand."""
-    length, high = chain_length(pattern, chain, size), collar.width
-    back, grown = _rests_on(pattern, chain, size, (1.0 - 2.0 * _STANDS) * high)
-    turn = 0.5 * length * max(0.0, grown - back) / (back * high)
-    shape = Strip(length=length, height=high, turn=-turn, even=True, tip=collar.point + _STANDS * high, lean=_LEAN)
-    return shape.edges(allowance=chain_allowance(pattern, chain, size))
+    Args:
+        length, high: of its lower edge, and in the middle of the back [m].
+        longer: length of the line on which its outer edge rests over that of where it turns.
+        tip: length of its front edges [m].
+    """
+    turn = 0.5 * length * max(0.0, longer - 1.0) / high
+    return Strip(length=length, height=high, turn=-turn, even=True, tip=tip, lean=_LEAN)
 
 
 def _with_stand(pattern: Pattern, chain: FreeChain, collar: Collar) -> Pattern:
     """Return a pattern with a stand along the whole neckline, and with the fall that is sewn into its upper edge, if it has one."""
     import shapely
 
-    stand, fall, made = free_piece_name(pattern, "collar_stand"), free_piece_name(pattern, "collar"), list[Piece]()
+    stand, fall = free_piece_name(pattern, "collar_stand"), free_piece_name(pattern, "collar")
     high, covers = collar.width, collar.fall - collar.width
     if collar.style == "shirt" and covers < _COVERS:
         raise InputError(
             f"the fall of a shirt collar hides the seam of its stand: fall_mm = {1e3 * collar.fall:g} must be at least "
             f"{1e3 * _COVERS:g} more than width_mm = {1e3 * high:g}"
         )
-    for size in pattern.pieces:
+
+    def draw(like: Piece) -> list[Piece]:
+        size = like.size
         length, allowance = chain_length(pattern, chain, size), chain_allowance(pattern, chain, size)
         centres = marks_of(pattern, chain, size, "centre front")
         beyond = min((at for at in (*centres, *(length - c for c in centres)) if at < 0.25 * length), default=0.0)
@@ -186,7 +193,7 @@ def _with_stand(pattern: Pattern, chain: FreeChain, collar: Collar) -> Pattern:
             left = joined(part_between(top, end, polyline_length(top)), left)
         outline = {"lower": lower, "right end": right, "upper": edge, "left end": left}
         edges = [Edge(name=name, points=points, allowance=allowance) for name, points in outline.items()]
-        made.append(_piece(pattern, stand, size, edges))
+        made = [_piece(stand, like, edges)]
         if beyond > 0.01:
             # The button lies on the centre front, and so does the buttonhole at the other end.
             middles, (x, y) = 0.5 * (low + ends), direction(np.array([low[0], ends[0]]))
@@ -197,11 +204,11 @@ def _with_stand(pattern: Pattern, chain: FreeChain, collar: Collar) -> Pattern:
             # The upper edge of the stand is shorter than the neckline there.
             middle = slice(*(round(count * (0.5 + sign * 0.5 * back / length)) for sign in (-1.0, 1.0)))
             own = back * polyline_length(upper[middle]) / polyline_length(lower[middle])
-            length = drawn_length(edge)
-            turn = 0.5 * length * max(0.0, grown - own) / (own * collar.fall)
-            shape = Strip(length=length, height=collar.fall, turn=-turn, even=True, tip=collar.point, lean=_LEAN)
-            made.append(_piece(pattern, fall, size, shape.edges(allowance=allowance)))
-    pattern = with_pieces(pattern, made)
+            shape = _turned_down(drawn_length(edge), collar.fall, grown / own, collar.point)
+            made.append(_piece(fall, like, shape.edges(allowance=allowance)))
+        return made
+
+    pattern = added(pattern, draw)
     if collar.style != "shirt":
         return _sewn_on(pattern, chain, stand)
     pattern = copies_sewn(pattern, f"{_words(fall)} edge", fall, *_AROUND)
@@ -236,8 +243,10 @@ def with_hood(
     if len(chains) != 1 or chains[0].closed or not _ends_in_front(pattern, chains[0]):
         raise InputError("a hood begins and ends at the centre front, and this neckline does not")
     chain, strip = chains[0], collar.strip
-    hood, middle, made = free_piece_name(pattern, "hood"), free_piece_name(pattern, "hood_strip"), list[Piece]()
-    for size in pattern.pieces:
+    hood, middle = free_piece_name(pattern, "hood"), free_piece_name(pattern, "hood_strip")
+
+    def draw(like: Piece) -> list[Piece]:
+        size = like.size
         neck = 0.5 * (chain_length(pattern, chain, size) - strip)
         lower = swept(Strip(length=2.0 * neck, height=0.1, turn=_HOOD_TURN))[0]
         lower = lower[len(lower) // 2 :] - lower[len(lower) // 2]
@@ -258,15 +267,17 @@ def with_hood(
             hem,
             Edge(name="crown", points=crown, allowance=allowance),
         ]
-        made.append(_piece(pattern, hood, size, edges, paired=True, role="hood"))
+        made = [_piece(hood, like, edges, paired=True, role="hood")]
         if strip:
             names = {"lower": "neck", "right end": "right side", "upper": "front edge", "left end": "left side"}
             edges = [
                 replace(hem, points=edge.points) if edge.name == "upper" else replace(edge, name=names[edge.name])
                 for edge in Strip(length=strip, height=drawn_length(crown)).edges(allowance=allowance)
             ]
-            made.append(_piece(pattern, middle, size, edges, quantity=1, role="hood"))
-    pattern = with_pieces(pattern, made)
+            made.append(_piece(middle, like, edges, quantity=1, role="hood"))
+        return made
+
+    pattern = added(pattern, draw)
     one, other = SeamSide(piece=hood, edge="neck"), SeamSide(piece=hood, edge="neck", reversed=True, mirrored=True)
     if not strip:
         return sewn(copies_sewn(pattern, "hood crown", hood, "crown"), "hood", (other, one), chain.sides)
@@ -322,21 +333,14 @@ def _rests_on(pattern: Pattern, chain: FreeChain, size: str, below: float) -> tu
 
 
 def _piece(
-    pattern: Pattern,
-    name: str,
-    size: str,
-    edges: Sequence[Edge],
-    *,
-    quantity: int = 2,
-    paired: bool = False,
-    role: str = "collar",
+    name: str, like: Piece, edges: Sequence[Edge], *, quantity: int = 2, paired: bool = False, role: str = "collar"
 ) -> Piece:
     """Return a new piece; its grain runs upwards through the middle."""
     outline = np.concatenate([edge.points for edge in edges])
     (x, low), (right, high) = outline.min(axis=0), outline.max(axis=0)
     grain = np.array([[0.5 * (x + right), share * high + (1.0 - share) * low] for share in (0.3, 0.7)])
     try:
-        return new_piece(name, pattern.pieces[size][0], edges, role, quantity=quantity, paired=paired, grain=grain)
+        return new_piece(name, like, edges, role, quantity=quantity, paired=paired, grain=grain)
     except InputError:
         raise InputError(f"no {_words(name)} of these measures can be drawn along this neckline") from None
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import BoolArray, FloatArray, arc_lengths, unit, without_side
+from warpflat.core import BoolArray, FloatArray, arc_lengths, line_name, unit
 from warpflat.flat import triangulate, vertex_normals
 from warpflat.pattern import ViewedPiece
 
@@ -138,7 +138,7 @@ def _chains(garment: FormGarment, called: str) -> Iterator[_Chain]:
         triangles, _ = triangulate(surface.faces)
         normals = vertex_normals(surface.vertices, triangles)
         for edge, ids in piece.edges.items():
-            if without_side(edge).rstrip(" 0123456789") != called:
+            if line_name(edge) != called:
                 continue
             points, out = surface.vertices[ids], normals[ids]
             beyond = np.cross(np.gradient(points, axis=0), out)

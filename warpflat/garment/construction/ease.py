@@ -12,6 +12,7 @@ from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest
 from warpflat.flat import Fabric
 from warpflat.garment.construction.form_plan import plan_form
 from warpflat.garment.construction.fullness import FullEdge
+from warpflat.garment.construction.sewn import Stitching
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.forms import FormResult
@@ -65,6 +66,18 @@ class SeamRatios:
     full: Mapping[str, tuple[FullEdge, ...]]
     eased: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     edge_ratios: Mapping[int, tuple[FloatArray, ...]] = field(default_factory=dict)
+
+    def stitching(self, form: FormResult) -> list[Stitching]:
+        """Return the seams of the form, run by run, as they are to be sewn."""
+        return [
+            Stitching(
+                name=seam.name, pieces=seam.pieces, vertices=run.vertices,
+                ratio=self.edge_ratios[number][i] if number in self.edge_ratios else self.ratios[number],
+                sides=(f"{seam.pieces[0]}.{seam.edges[0]}", f"{seam.pieces[1]}.{seam.edges[1]}"),
+            )
+            for number, seam in enumerate(form.seams)
+            for i, run in enumerate(seam.runs)
+        ]  # fmt: skip
 
 
 def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
@@ -168,7 +181,7 @@ def _longer_side(seam: Seam, longer: str | None) -> int:
             f"seam {seam.name!r}: {longer!r} is not one of its sides; {nearest(longer, named[0] | named[1])}"
         )
     if len(found) == 2:
-        edges = {str(side) for sides in seam.sides for side in sides}
+        edges = {str(side) for side in seam.stretches}
         raise InputError(f"seam {seam.name!r}: both sides are of {longer!r}; name the edge: {', '.join(sorted(edges))}")
     return found[0]
 

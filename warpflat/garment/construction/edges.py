@@ -20,6 +20,7 @@ __all__ = [
     "ON",
     "ON_EDGE",
     "Place",
+    "added",
     "backwards",
     "beside",
     "bezier",
@@ -223,6 +224,11 @@ def redrawn(pattern: Pattern, name: str, draw: Callable[[Piece], Piece | Iterabl
     return with_pieces(pattern, (each for row in made for each in ((row,) if isinstance(row, Piece) else row)))
 
 
+def added(pattern: Pattern, draw: Callable[[Piece], Piece | Iterable[Piece]]) -> Pattern:
+    """Return a pattern with new pieces in every size: `draw` gets a piece of that size and of the shell's cloth."""
+    return redrawn(pattern, pattern.pieces[pattern.sample][0].name, draw)
+
+
 def changed(pattern: Pattern, place: Place, change: Callable[[Piece, Edge], Sequence[Edge]]) -> Pattern:
     """Return a pattern with what `change` makes of an edge of a piece, in every size."""
     name, edge = place
@@ -261,4 +267,4 @@ def copies_sewn(pattern: Pattern, name: str, piece: str, *edges: str) -> Pattern
 
 def sewn_places(pattern: Pattern) -> set[Place]:
     """Return the edges that seams join."""
-    return {(side.piece, side.edge) for seam in pattern.seams for row in seam.sides for side in row}
+    return {side.place for seam in pattern.seams for side in seam.stretches}

@@ -60,17 +60,15 @@ def draw_equal_pieces_once(pattern: Pattern, called: str = "") -> tuple[Pattern,
     (size, pieces), *others = pattern.pieces.items()
     if others or len(pieces) < 2:
         return pattern, ()
-    sewn = [side for seam in pattern.seams for row in seam.sides for side in row]
-    unlike = {side.piece for seam in pattern.seams if seam.ease or seam.openings for row in seam.sides for side in row}
-    unlike |= {
-        side.piece for seam in pattern.seams if max(map(len, seam.sides)) > 1 for row in seam.sides for side in row
-    }
+    sewn = [side for seam in pattern.seams for side in seam.stretches]
+    unlike = {side.piece for seam in pattern.seams if seam.ease or seam.openings for side in seam.stretches}
+    unlike |= {side.piece for seam in pattern.seams if max(map(len, seam.sides)) > 1 for side in seam.stretches}
     free = [
         piece
         for piece in pieces
         if piece.name.startswith(called) and not (piece.darts or piece.holes or piece.on_fold or piece.name in unlike)
     ]
-    at_seams = {(side.piece, side.edge) for side in sewn}
+    at_seams = {side.place for side in sewn}
     copies: dict[str, list[_Copy]] = {}
     for number, head in enumerate(free):
         if head.name in copies or any(ways[0].of == head.name for ways in copies.values()):
@@ -235,20 +233,18 @@ def _run_alike(seams: Sequence[Seam]) -> tuple[Seam, ...] | None:
     way: dict[tuple[str, str], bool] = {}
     # A row of several edges, as a waist's, keeps its order: two of them may be one edge and its mirror image.
     single = [row[0] for seam in seams for row in seam.sides if len(row) == 1]
-    copied = {(s.piece, s.edge) for s in single if not s.is_drawn}
+    copied = {s.place for s in single if not s.is_drawn}
     waiting = list(enumerate(seams))
     made: dict[int, Seam] = {}
     while waiting:
         # Next one whose direction others say.
-        number, seam = next(
-            (one for one in waiting if any((s.piece, s.edge) in way for row in one[1].sides for s in row)), waiting[0]
-        )
+        number, seam = next((one for one in waiting if any(s.place in way for s in one[1].stretches)), waiting[0])
         waiting.remove((number, seam))
-        known = [s for row in seam.sides for s in row if (s.piece, s.edge) in way]
+        known = [s for s in seam.stretches if s.place in way]
         if known and known[0].reversed != way[known[0].piece, known[0].edge]:
             sides = [tuple(replace(s, reversed=not s.reversed) for s in reversed(row)) for row in seam.sides]
             seam = replace(seam, sides=(sides[0], sides[1]))
-        for s in (s for row in seam.sides for s in row):
+        for s in seam.stretches:
             key = s.piece, s.edge
             if key in copied and way.setdefault(key, s.reversed) != s.reversed:
                 return None

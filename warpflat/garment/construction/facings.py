@@ -38,8 +38,8 @@ from warpflat.garment.construction.edges import (
 from warpflat.pattern import Edge, Pattern, Piece, SeamSide
 
 __all__ = [
-    "INNER", "STAND", "STAND_END", "Stand", "centre_notch", "is_beside", "sewn_alike", "strip_along", "strip_piece", "with_facings",
-    "with_stand_facings",
+    "INNER", "STAND", "STAND_END", "Stand", "centre_notch", "is_beside", "sewn_alike", "sewn_inside", "strip_along", "strip_piece",
+    "with_facings", "with_stand_facings",
 ]  # fmt: skip
 
 #: What the outer edge and the lower end of a button stand are called, after its line, and the inner edge of a facing.
@@ -253,6 +253,11 @@ def _start(points: FloatArray, length: float, beside: Edge) -> FloatArray:
             raise InputError(f"the edges beside {beside.name} are shorter than the facing is wide")
         length = float(np.interp(length, away, arc_lengths(points)))
     return part_between(points, 0.0, length)
+
+
+def sewn_inside(edges: Sequence[Edge]) -> list[Edge]:
+    """Return the edges of a strip with its inner edge as a seam."""
+    return [replace(edge, kind="seam", allowance=None) if edge.name == INNER else edge for edge in edges]
 
 
 def strip_piece(piece: Piece, edges: Sequence[Edge], title: str, role: str, **other: Any) -> Piece:

@@ -8,18 +8,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, nearest, other_side, without_side
+from warpflat.core import FloatArray, InputError, line_name, nearest, other_side, without_side
 from warpflat.garment.construction.button_stand import buttonhole
 from warpflat.garment.construction.collars import Collar, with_collar, with_hood
 from warpflat.garment.construction.edges import (
     Place,
+    added,
     changed,
     free_piece_name,
     lengths_of,
     new_piece,
     sewn,
     sewn_places,
-    with_pieces,
 )
 from warpflat.garment.construction.facings import Stand, centre_notch, is_beside, with_facings, with_stand_facings
 from warpflat.garment.construction.flounces import with_flounce
@@ -138,9 +138,48 @@ def finish_edges(
                 faced |= {stand for stand in stands for place in places if is_beside(pattern, stand, place)}
     pattern = with_stand_facings(pattern, [stand for stand in stands if stand not in faced])
     for number, wish in enumerate(finishing):
+        if wish.kind == "hem":
+            continue
         with _said_of(number):
-            if wish.kind != "hem":
-                pattern = _with_finish(pattern, wish, gaps, stands, girths or {}, cloth_width)
+            pattern, places = _opened_up(pattern, wish.edge)
+            if wish.elastic:
+                # Around one limb where the edge has a side.
+                levels = [places[0][1], wish.edge, f"{wish.edge} left"]
+                lengths = {size: wish.elastic * _girth_at(size, levels, girths or {}) for size in pattern.pieces}
+                # One on each side of the body, or one.
+                count = 2 if any(without_side(edge) != edge for _, edge in places) else 1
+                elastic = Elastic(edge=wish.edge, width=wish.width, lengths=lengths, count=count)
+                pattern = replace(pattern, elastics=(*pattern.elastics, elastic))
+            collar, breaks = wish.collar, list[Break]()
+            if wish.kind == "facing":
+                pattern = with_facings(pattern, places, wish.width, gaps=gaps, stands=stands)
+            elif collar is not None and wish.kind == "hood":
+                heads = {size: _girth_at(size, ["head"], girths or {}) for size in pattern.pieces}
+                pattern = with_hood(pattern, places, collar, heads, gaps=gaps)
+            elif collar is not None and collar.style != "turtleneck":
+                if wish.placket:
+                    pattern, breaks = with_placket(pattern, places, wish.placket, wish.edge)
+                    pattern, places = _opened_up(pattern, wish.edge)
+                pattern = with_collar(pattern, places, collar, gaps=gaps, breaks=breaks)
+            elif wish.kind == "casing":
+
+                def turned_in(_: Piece, edge: Edge, wide: float = wish.width + NARROW) -> list[Edge]:
+                    # With an allowance of its width, and the edge turned in once more.
+                    return [replace(edge, kind="hem", allowance=wide)]
+
+                for place in places:
+                    pattern = changed(pattern, place, turned_in)
+            elif wish.shaped:
+                pattern = with_shaped_waistband(pattern, places, wish.width, gaps=gaps)
+            else:
+                if wish.placket and wish.kind != "flounce":
+                    pattern, breaks = with_slits(pattern, places, wish.placket, "sleeve")
+                    pattern, places = _opened_up(pattern, wish.edge)
+                for chain, count in free_chains(pattern, places, gaps, breaks):
+                    if wish.kind == "flounce":
+                        pattern = with_flounce(pattern, chain, wish.width, wish.turns, wish.edge, cloth_width)
+                    else:
+                        pattern = _with_strip(pattern, wish, chain, count, cloth_width)
     return pattern
 
 
@@ -151,54 +190,6 @@ def _said_of(number: int) -> Iterator[None]:
         yield
     except InputError as error:
         raise InputError(f"finishing[{number}]: {error}") from None
-
-
-def _with_finish(
-    pattern: Pattern,
-    wish: Finishing,
-    gaps: Collection[str],
-    stands: Sequence[Stand],
-    girths: Mapping[str, Mapping[str, float]],
-    cloth_width: float,
-) -> Pattern:
-    """Return a pattern with one finishing; see :func:`finish_edges`."""
-    pattern, places = _opened_up(pattern, wish.edge)
-    if wish.elastic:
-        # Around one limb where the edge has a side.
-        levels = [places[0][1], wish.edge, f"{wish.edge} left"]
-        lengths = {size: wish.elastic * _girth_at(size, levels, girths) for size in pattern.pieces}
-        # One on each side of the body, or one.
-        count = 2 if any(without_side(edge) != edge for _, edge in places) else 1
-        elastic = Elastic(edge=wish.edge, width=wish.width, lengths=lengths, count=count)
-        pattern = replace(pattern, elastics=(*pattern.elastics, elastic))
-    collar, breaks = wish.collar, list[Break]()
-    if wish.kind == "facing":
-        return with_facings(pattern, places, wish.width, gaps=gaps, stands=stands)
-    if collar is not None and wish.kind == "hood":
-        heads = {size: _girth_at(size, ["head"], girths) for size in pattern.pieces}
-        return with_hood(pattern, places, collar, heads, gaps=gaps)
-    if collar is not None and collar.style != "turtleneck":
-        if wish.placket:
-            pattern, breaks = with_placket(pattern, places, wish.placket, wish.edge)
-            pattern, places = _opened_up(pattern, wish.edge)
-        return with_collar(pattern, places, collar, gaps=gaps, breaks=breaks)
-    if wish.kind == "casing":
-        # Turned in, with an allowance of its width, and the edge turned in once more.
-        wide = wish.width + NARROW
-        for place in places:
-            pattern = changed(pattern, place, lambda _, edge: [replace(edge, kind="hem", allowance=wide)])
-        return pattern
-    if wish.shaped:
-        return with_shaped_waistband(pattern, places, wish.width, gaps=gaps)
-    if wish.placket and wish.kind != "flounce":
-        pattern, breaks = with_slits(pattern, places, wish.placket, "sleeve")
-        pattern, places = _opened_up(pattern, wish.edge)
-    for chain, count in free_chains(pattern, places, gaps, breaks):
-        if wish.kind == "flounce":
-            pattern = with_flounce(pattern, chain, wish.width, wish.turns, wish.edge, cloth_width)
-        else:
-            pattern = _with_strip(pattern, wish, chain, count, cloth_width)
-    return pattern
 
 
 def hem_rises(pattern: Pattern, finishing: Sequence[Finishing]) -> dict[Place, tuple[FloatArray, FloatArray]]:
@@ -234,7 +225,7 @@ def _opened_up(pattern: Pattern, called: str, *, sewn_there: bool = True) -> tup
         if (piece.name, edge.name) not in taken
         and (edge.kind == "seam" or (edge.kind == "hem" and piece.role == "shell"))
     }
-    names = {edge: without_side(edge).rstrip(" 0123456789") for _, edge in free}
+    names = {edge: line_name(edge) for _, edge in free}
     places = [place for place in free if names[place[1]] == called]
     if not places:
         raise InputError(f"no free edge {called!r}; {nearest(called, set(names.values()))}")
@@ -272,7 +263,7 @@ def _with_strip(pattern: Pattern, wish: Finishing, chain: FreeChain, count: int,
     name, words = free_piece_name(pattern, wish.name), free_piece_name(pattern, wish.name).replace("_", " ")
     lengths = {size: wish.share * chain_length(pattern, chain, size) for size in pattern.pieces}
     allowances = {size: chain_allowance(pattern, chain, size) for size in pattern.pieces}
-    folded, (weft, warp), _ = _STRIPS[wish.kind]
+    folded, (weft, warp), role = _STRIPS[wish.kind]
     high = wish.width * (2 if folded else 1)
 
     def width_of(panels: int) -> float:
@@ -284,15 +275,48 @@ def _with_strip(pattern: Pattern, wish: Finishing, chain: FreeChain, count: int,
     # What is cut along the cloth is as long as it likes.
     panels = panel_count(width_of, cloth_width) if warp > 0.0 and not wish.overlap else 1
     ring = chain.closed and not wish.overlap
-    joined, quantity = ring or panels > 1, count * panels
-    made = [
-        _strip(wish, name, row[0], lengths[size] / panels, quantity=quantity, joined=joined, allowance=allowances[size])
-        for size, row in pattern.pieces.items()
-    ]
-    pattern = with_pieces(pattern, made)
+    # What is turned in has an allowance too, and no seam; a binding's other edge is folded over as it is cut.
+    ends = "seam" if ring or panels > 1 else "cut"
+
+    def strip(like: Piece) -> Piece:
+        length, allowance = lengths[like.size] / panels, allowances[like.size]
+        upper = {"binding": ("cut", 0.0), "ruffle": ("hem", NARROW)}.get(wish.kind, ("cut", allowance))
+        edges = Strip(length=length, height=high).edges(
+            overlap=wish.overlap,
+            kinds={"overlap": "cut", "upper": upper[0], "right end": ends, "left end": ends},
+            allowance={**dict.fromkeys(("lower", "right end", "left end", "overlap"), allowance), "upper": upper[1]},
+        )
+        whole = length + wish.overlap
+        middle, reach = np.array([0.5 * whole, 0.5 * high]), 0.4 * (whole if warp == 0.0 else high)
+        lines = {"fold line": np.array([[0.0, wish.width], [whole, wish.width]])} if folded else {}
+        if wish.pleat:
+            # Knife pleats: half of what each takes lies at either end of its stretch.
+            pleats = _pleat_count(wish, length)
+            stretch, hidden = length / pleats, 0.5 * length / pleats * (1.0 - 1.0 / wish.share)
+            for number in range(pleats):
+                for what, x in (("pleat lies here", hidden), ("pleat fold", stretch - hidden)):
+                    x += number * stretch
+                    lines[f"{what} {number + 1}"] = np.array([[x, 0.0], [x, high]])
+        marks = {}
+        if wish.overlap:
+            # It buttons upon itself, in the middle of its outer half.
+            marks["button"] = np.array([length + 0.5 * wish.overlap, 0.5 * wish.width])
+            lines |= buttonhole(np.array([0.5 * wish.overlap, 0.5 * wish.width]), np.array([1.0, 0.0]))
+        return new_piece(
+            name, like, edges, role, quantity=count * panels, internal_lines=lines, marks=marks,
+            grain=middle + np.outer([-reach, reach], (weft, warp)),
+        )  # fmt: skip
+
+    pattern = added(pattern, strip)
     size_notches: dict[str, tuple[float, ...]] = {}
-    sided = any(without_side(side.edge) != side.edge for side in chain.sides)
-    notches = None if sided else _centres(pattern, chain)
+    notches: tuple[float, ...] | None = None
+    if all(without_side(side.edge) == side.edge for side in chain.sides):
+        # In the middles of the edges that cross a centre line; their joints are notched anyway. A piece that is printed half has the notch
+        # on its fold, and the strip has one for it.
+        along = np.array(lengths_of(pattern, chain.sides))
+        middles = ((np.cumsum(along) - 0.5 * along) / along.sum()).tolist()
+        whole_pieces = [centre_notch(pattern.piece(side.piece, pattern.sample)) is not None for side in chain.sides]
+        notches = tuple(at for at, crosses in zip(middles, whole_pieces, strict=True) if crosses)
     if wish.pleat:
         # Lengths of the strip and of its edge fit each other from pleat to pleat alone.
         notches = ()
@@ -315,51 +339,3 @@ def _with_strip(pattern: Pattern, wish: Finishing, chain: FreeChain, count: int,
 def _pleat_count(wish: Finishing, length: float) -> int:
     """Return how many pleats a panel of a strip of that length [m] is laid in."""
     return max(1, round(length / wish.share / wish.pleat))
-
-
-def _centres(pattern: Pattern, chain: FreeChain) -> tuple[float, ...]:
-    """Return the shares of a chain at the middles of the edges that cross a centre line; its joints are notched anyway.
-
-    A piece that is printed half has the notch on its fold, and the strip has one for it.
-    """
-    lengths = lengths_of(pattern, chain.sides)
-    ends = np.cumsum(lengths)
-    whole = [centre_notch(pattern.piece(side.piece, pattern.sample)) is not None for side in chain.sides]
-    return tuple(
-        float((end - 0.5 * length) / ends[-1])
-        for end, length, crosses in zip(ends, lengths, whole, strict=True)
-        if crosses
-    )
-
-
-def _strip(
-    wish: Finishing, name: str, like: Piece, length: float, *, quantity: int, joined: bool, allowance: float
-) -> Piece:
-    """Return a straight strip of one size, or a panel of one; `joined` are its ends to each other or to other panels."""
-    folded, along, role = _STRIPS[wish.kind]
-    high, whole = wish.width * (2 if folded else 1), length + wish.overlap
-    # What is turned in has an allowance too, and no seam; a binding's other edge is folded over as it is cut.
-    ends = "seam" if joined else "cut"
-    upper = {"binding": ("cut", 0.0), "ruffle": ("hem", NARROW)}.get(wish.kind, ("cut", allowance))
-    edges = Strip(length=length, height=high).edges(
-        overlap=wish.overlap,
-        kinds={"overlap": "cut", "upper": upper[0], "right end": ends, "left end": ends},
-        allowance={**dict.fromkeys(("lower", "right end", "left end", "overlap"), allowance), "upper": upper[1]},
-    )  # fmt: skip
-    middle, reach = np.array([0.5 * whole, 0.5 * high]), 0.4 * (whole if along[1] == 0.0 else high)
-    lines = {"fold line": np.array([[0.0, wish.width], [whole, wish.width]])} if folded else {}
-    if wish.pleat:
-        # Knife pleats: half of what each takes lies at either end of its stretch.
-        count = _pleat_count(wish, length)
-        stretch, hidden = length / count, 0.5 * length / count * (1.0 - 1.0 / wish.share)
-        for number in range(count):
-            for what, x in (("pleat lies here", hidden), ("pleat fold", stretch - hidden)):
-                x += number * stretch
-                lines[f"{what} {number + 1}"] = np.array([[x, 0.0], [x, high]])
-    marks = {}
-    if wish.overlap:
-        # It buttons upon itself, in the middle of its outer half.
-        marks["button"] = np.array([length + 0.5 * wish.overlap, 0.5 * wish.width])
-        lines |= buttonhole(np.array([0.5 * wish.overlap, 0.5 * wish.width]), np.array([1.0, 0.0]))
-    grain = middle + np.outer([-reach, reach], along)
-    return new_piece(name, like, edges, role, quantity=quantity, internal_lines=lines, grain=grain, marks=marks)

@@ -17,7 +17,7 @@ from warpflat.garment.construction.edges import (
     redrawn,
 )
 from warpflat.garment.construction.strips import folded_strip
-from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
+from warpflat.pattern import Edge, Pattern, Piece, Seam
 
 __all__ = ["with_flies"]
 
@@ -33,9 +33,18 @@ def with_flies(pattern: Pattern) -> Pattern:
     """
     for seam in pattern.seams:
         zips = [each for each in seam.openings if each.kind == "zip" and each.style == "lapped" and not each.begin]
-        sides = [side for row in seam.sides for side in row]
+        sides = seam.stretches
         in_front = all("front" in re.split("[ _]", side.piece) for side in sides)
-        bands = _bands_above(pattern, sides[0])
+        # Waistbands that are sewn to the edge above.
+        above = _above(pattern.piece(sides[0].piece, pattern.sample), sides[0].edge)
+        bands = [
+            other.piece
+            for joint in pattern.seams
+            for own, others in (joint.sides, joint.sides[::-1])
+            if any(each.place == (sides[0].piece, above) for each in own)
+            for other in others
+            if pattern.piece(other.piece, pattern.sample).role == "waistband"
+        ]
         if zips and len(sides) == 2 and in_front and bands:
             pattern = _with_fly(pattern, seam, zips[0].length + _BELOW, bands[0])
     return pattern
@@ -44,19 +53,6 @@ def with_flies(pattern: Pattern) -> Pattern:
 def _above(piece: Piece, name: str) -> str:
     """Return the name of the edge above another one."""
     return neighbour(piece, name, 0 if downwards(piece, name)[1] else 1)[0]
-
-
-def _bands_above(pattern: Pattern, side: SeamSide) -> list[str]:
-    """Return the waistbands that are sewn to the edge above another one."""
-    above = _above(pattern.piece(side.piece, pattern.sample), side.edge)
-    return [
-        other.piece
-        for seam in pattern.seams
-        for own, others in (seam.sides, seam.sides[::-1])
-        if any((each.piece, each.edge) == (side.piece, above) for each in own)
-        for other in others
-        if pattern.piece(other.piece, pattern.sample).role == "waistband"
-    ]
 
 
 def _with_fly(pattern: Pattern, seam: Seam, length: float, band: str) -> Pattern:

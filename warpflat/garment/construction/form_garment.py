@@ -30,7 +30,6 @@ from warpflat.garment.construction.girths import girth_constraints, loose_armhol
 from warpflat.garment.construction.openings import opened_rings
 from warpflat.garment.construction.rings import GarmentRing, measure_rings
 from warpflat.garment.construction.sewing import sew
-from warpflat.garment.construction.sewn import Stitching
 from warpflat.garment.construction.wearer import WearerFit, assess_wearer
 from warpflat.garment.mannequin.forms import FormResult
 from warpflat.garment.mannequin.mannequin import Mannequin
@@ -200,12 +199,8 @@ def flatten_form(
     expect(mannequin, Mannequin, "mannequin", "a Mannequin")
     expect_callback(callback)
     expect_each(wishes, SeamWish, "wishes", "a SeamWish")
-    expect_each(
-        constraints,
-        (DartMouth, FixedLength, Straight, Symmetric),
-        "constraints",
-        "a Straight, FixedLength, Symmetric or DartMouth",
-    )
+    kinds = (DartMouth, FixedLength, Straight, Symmetric)
+    expect_each(constraints, kinds, "constraints", "a Straight, FixedLength, Symmetric or DartMouth")
     wished = seam_ratios(form, wishes)
     pieces = {name: flat for name, flat in (known or {}).items() if flat.surface is form.pieces[name].surface}
     names = [name for name in form.pieces if name not in pieces]
@@ -220,37 +215,22 @@ def flatten_form(
         **options,
     )
     pieces |= dict(zip(names, flat, strict=True))
-    pairs = [
-        Stitching(
-            name=seam.name, pieces=seam.pieces, vertices=run.vertices,
-            ratio=wished.edge_ratios[number][i] if number in wished.edge_ratios else wished.ratios[number],
-            sides=(f"{seam.pieces[0]}.{seam.edges[0]}", f"{seam.pieces[1]}.{seam.edges[1]}"),
-        )
-        for number, seam in enumerate(form.seams)
-        for i, run in enumerate(seam.runs)
-    ]  # fmt: skip
     near = np.linalg.norm(form.vertices - mannequin.vertices, axis=1) <= TOUCHING
+    full = dict[str, Flattening]()
     for name, piece in form.pieces.items():
         faces = piece.surface.faces
         close = np.asarray((near[piece.grid_vertices[faces]] | (faces < 0)).all(axis=1))
-        pieces[name] = replace(pieces[name], close=close)
-    garment = FormGarment(
-        name=form.name,
-        mannequin=mannequin,
-        form=form,
-        pieces={name: pieces[name] for name in form.pieces},
-        stitching=[*pairs, *dart_pairs(form)],
-    )
+        full[name] = replace(pieces[name], close=close)
+    pairs = wished.stitching(form)
+    stitching = [*pairs, *dart_pairs(form)]
+    garment = FormGarment(name=form.name, mannequin=mannequin, form=form, pieces=dict(full), stitching=stitching)
     if not sewn:
         return garment
-    full = dict(garment.pieces)
     for name, edges in wished.full.items():
-        sides = [row for pair in pairs for piece, row in zip(pair.pieces, pair.vertices, strict=True) if piece == name]
-        plain = [row for row in sides if not any(row is edge.vertices for edge in edges)]
-        full[name] = give_fullness(full[name], edges, plain, options=relax)
+        rows = [row for pair in pairs for piece, row in zip(pair.pieces, pair.vertices, strict=True) if piece == name]
+        full[name] = give_fullness(full[name], edges, rows, options=relax)
     folds = {name: piece.edges[piece.fold] for name, piece in form.pieces.items() if piece.fold}
     held = (*constraints, *straight_hems(form, constraints), *dart_constraints(form))
-    knit = next(iter(pieces.values())).fabric.is_knit
     girths = girth_constraints(mannequin, form, {name: piece.positions for name, piece in full.items()})
 
     def sewn_under(held: Sequence[Constraint]) -> FormGarment:
@@ -264,14 +244,11 @@ def flatten_form(
     if not girths:
         return sewn_under(held)
     kept = sewn_under([*held, *girths])
-    if (
-        kept.sewn is not None
-        and kept.sewn.converged
-        and not (knit and any(not each.fit.within_limits for each in kept.pieces.values()))
-    ):
+    at_rest = kept.sewn is not None and kept.sewn.converged
+    if at_rest and all(each.fit.within_limits or not each.fabric.is_knit for each in kept.pieces.values()):
         return kept
     free = sewn_under(held)
-    if kept.sewn is None or not kept.sewn.converged:
+    if not at_rest:
         words = (
             "the girths are as the cloth has them: seams and constraints leave no room for the ease that is asked for"
         )

@@ -108,15 +108,13 @@ def free_chains(
     while left:
         chain = free_chain(pattern, [left[0], *places], gaps, breaks)
         chains.append(chain)
-        left = [place for place in left if place not in {(side.piece, side.edge) for side in chain.sides}]
+        left = [place for place in left if place not in {side.place for side in chain.sides}]
     found, drawn_for_both = list[tuple[FreeChain, int]](), list[FreeChain]()
     for chain in chains:
-        own = {(side.piece, side.edge) for side in chain.sides}
+        own = {side.place for side in chain.sides}
         mirrored = {(other_side(piece), other_side(edge)) for piece, edge in own}
         sided = any(without_side(edge) != edge for _, edge in own)
-        twin = next(
-            (each for each in chains if each is not chain and mirrored & {(s.piece, s.edge) for s in each.sides}), None
-        )
+        twin = next((each for each in chains if each is not chain and mirrored & {s.place for s in each.sides}), None)
         if not sided or (twin is not None and abs(chain_length(pattern, chain) - chain_length(pattern, twin)) > _ALIKE):
             found.append((chain, 1))
         elif twin not in drawn_for_both:
@@ -181,7 +179,7 @@ def _across(pattern: Pattern, corner: _Corner, gaps: Collection[str]) -> _Corner
                     if reached != (piece, edge, mirrored) or (end == 0) == (at_start == side.reversed):
                         continue
                     # Halves that meet in the centre are one edge twice. Of a half's other seams the list has the left one.
-                    centre = (side.piece, side.edge) == (other.piece, other.edge)
+                    centre = side.place == other.place
                     if seam.name in gaps and (centre or not turned) and _is_open_at(pattern, seam, side, at_start):
                         return None
                     turned_over = not mirrored if centre else other.mirrored != turned

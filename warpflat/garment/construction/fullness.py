@@ -16,22 +16,20 @@ import numpy as np
 
 from warpflat.core import FloatArray, IntArray, polyline_length
 from warpflat.flat import (
-    STEPS,
     Flattening,
     GrainAlignment,
     Relaxation,
     RelaxOptions,
     SpringArrays,
     SpringNetwork,
-    Stage,
     border_loops,
     falloff_weights,
     given_options,
     grain_axes,
+    make_stages,
     relax_under_equations,
     springs_of,
     step_matrix,
-    strain_energy,
     with_stiffness,
 )
 
@@ -55,17 +53,18 @@ class FullEdge:
 
 
 def give_fullness(
-    piece: Flattening, edges: Sequence[FullEdge], plain: Sequence[IntArray], *, options: RelaxOptions | None = None
+    piece: Flattening, edges: Sequence[FullEdge], sewn: Sequence[IntArray], *, options: RelaxOptions | None = None
 ) -> Flattening:
     """Give a piece fullness along some edges, and relax it again on its own.
 
     Args:
         piece: flattened, uncut.
         edges: which edges, and how much.
-        plain: vertices along each of its edges that are sewn without fullness.
+        sewn: vertices along each of its edges that are sewn, with fullness or without.
         options: of the relaxation.
     """
     options = given_options(options)
+    plain = [row for row in sewn if not any(row is edge.vertices for edge in edges)]
     full = measure_fullness(piece, edges, plain)
     warp, weft = axes = grain_axes(piece.grain_angle)
     # Gathers slant the mesh's edges off the grain, and springs along them would be another cloth.
@@ -101,23 +100,6 @@ def give_fullness(
     state = Relaxation(network, options, start=piece.positions @ widening, alignments=[alignment])
     outcome = relax_under_equations(state).outcome
     positions = state.positions()
-    ends = [("fullness", positions, outcome)]
-    if outcome.first_steps is not None and outcome.first_layout is not None:
-        ends.insert(0, (STEPS, outcome.first_layout, outcome.first_steps))
-    stages = [
-        Stage(
-            name=name,
-            model_energy_j=end.energies.potential,
-            guard_energy_j=end.energies.guard,
-            strain_energy_j=strain_energy(network, layout),
-            steps=end.steps,
-            work_units=end.work_units,
-            seconds=end.seconds,
-            converged=end.converged,
-            residual=None if np.isnan(end.residual) else end.residual,
-        )
-        for name, layout, end in ends
-    ]
     most = max(edge.factor for edge in edges)
     note = f"{piece.surface.name} has up to {100 * (most - 1.0):.3g} % more length than the body, to be eased or gathered in"
     notes = (*piece.notes, note)
@@ -125,7 +107,7 @@ def give_fullness(
         piece,
         network=network,
         positions=positions,
-        stages=(*piece.stages, *stages),
+        stages=(*piece.stages, *make_stages("fullness", network, positions, outcome)),
         notes=notes,
         unsewn=piece.unsewn or piece,
     )

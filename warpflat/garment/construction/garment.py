@@ -215,11 +215,10 @@ class Garment:
         Raises:
             InputError: the folder cannot be written, or the body was read from a file there that would be replaced.
         """
-        from warpflat.core import output_folder, require_own_metrics, write_report
+        from warpflat.core import output_folder, write_report
 
         others = [*(["picture.png"] if picture else []), "metrics.json"]
         with output_folder(folder, others, sources=self.sources, guard=True) as to:
-            require_own_metrics(to)
             files = self.write_files(to, picture=picture)
             write_report(to / "metrics.json", self.metrics(), name=self.name, files=files)
         return [*files, "metrics.json"]

@@ -5,13 +5,14 @@ Around trunk, arms and legs tapes are level; at the neck and around an armhole t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, IntArray, segment_lengths, without_side
+from warpflat.core import FloatArray, IntArray, polyline_length, without_side
 from warpflat.flat import TOO_LARGE
 from warpflat.garment.construction.constraints import KeptGirth
 from warpflat.garment.construction.tapes import ALONG, PieceEdges, RowEdges, stretch_tape
@@ -98,27 +99,21 @@ def pattern_girths(
     layout = mannequin.layout
     piece_edges = PieceEdges(layout, form)
     found: dict[str, dict[str, float]] = {}
+
+    def measure(name: str, row: IntArray, edges: RowEdges, tape: Callable[[FloatArray], float]) -> None:
+        pattern = float(edges.lengths(positions, len(row)).sum())
+        body, designed = (tape(points[row]) for points in (mannequin.vertices, form.vertices))
+        found[name] = {"body_m": body, "form_m": designed, "pattern_m": pattern, "ease_m": pattern - body}
+
     for level in reversed(RING_LEVELS):
         row = _row(layout, level)
         edges = piece_edges.along(row)
-        if edges is None:
-            continue
-        pattern = float(edges.lengths(positions, len(row)).sum())
-        body = convex_girth(mannequin.vertices[row])
-        found[level] = {
-            "body_m": body,
-            "form_m": convex_girth(form.vertices[row]),
-            "pattern_m": pattern,
-            "ease_m": pattern - body,
-        }
-        if level in form.ease:
-            found[level]["ease_wanted_m"] = 0.01 * form.ease[level]
+        if edges is not None:
+            measure(level, row, edges, convex_girth)
+            if level in form.ease:
+                found[level]["ease_wanted_m"] = 0.01 * form.ease[level]
     for name, (row, edges) in _lines(layout, form).items():
-        pattern = float(edges.lengths(positions, len(row)).sum())
-        body, designed = (
-            float(segment_lengths(points[row], closed=True).sum()) for points in (mannequin.vertices, form.vertices)
-        )
-        found[name] = {"body_m": body, "form_m": designed, "pattern_m": pattern, "ease_m": pattern - body}
+        measure(name, row, edges, partial(polyline_length, closed=True))
     # Of limbs what the recipe asks for, but between ruled levels, where cloth hangs.
     limbs, asked = [*ARM_LEVELS, *LEG_LEVELS], form.recipe.ease
     spans = [sorted(map(limbs.index, pair)) for pair in form.recipe.ruled if set(pair) <= set(limbs)]
@@ -127,9 +122,11 @@ def pattern_girths(
         edges = piece_edges.along(row, axis) if limb != name else None
         if edges is None:
             continue
-        pattern = float(edges.lengths(positions, len(row)).sum())
-        body, designed = (stretch_tape(points[row], axis).girth for points in (mannequin.vertices, form.vertices))
-        found[name] = {"body_m": body, "form_m": designed, "pattern_m": pattern, "ease_m": pattern - body}
+
+        def tape(points: FloatArray, axis: FloatArray = axis) -> float:
+            return stretch_tape(points, axis).girth
+
+        measure(name, row, edges, tape)
         level = limb if limb in ARM_LEVELS else f"leg_{limb}"
         if level in asked and not any(low < limbs.index(level) < high for low, high in spans):
             found[name]["ease_wanted_m"] = 0.01 * asked[level]

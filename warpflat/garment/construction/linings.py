@@ -8,7 +8,7 @@ import numpy as np
 
 from warpflat.core import InputError
 from warpflat.garment.construction.edges import free_piece_name, in_sizes, new_piece, sewn, with_pieces
-from warpflat.garment.construction.facings import INNER, centre_notch
+from warpflat.garment.construction.facings import INNER, centre_notch, sewn_inside
 from warpflat.garment.construction.shaped_band import without_strip
 from warpflat.pattern import Edge, Pattern, Piece, SeamSide
 
@@ -81,18 +81,14 @@ def add_lining(pattern: Pattern, cloth: str) -> Pattern:
             piece, name=name, fabric=cloth, role="lining", edges=hems, marks={}, also={}, internal_lines=kept
         )
 
-    def joined(piece: Piece) -> Piece:
-        # The inner edge of a facing is a seam now.
-        seam = [replace(each, kind="seam", allowance=None) if each.name == INNER else each for each in piece.edges]
-        return replace(piece, edges=seam) if piece.role == "facing" else piece
-
-    whole = with_pieces(pattern, map(joined, pattern))
+    inside = [replace(piece, edges=sewn_inside(piece.edges)) for piece in pattern if piece.role == "facing"]
+    whole = with_pieces(pattern, inside)
     whole = with_pieces(whole, [lining(piece) for name in shell for piece in in_sizes(pattern, name)])
     edges = {(piece.name, edge.name) for piece in whole.pieces[pattern.sample] for edge in piece.edges}
     seams = list(pattern.seams)
     for seam in pattern.seams:
         first, second = (tuple(replace(side, piece=names.get(side.piece, "")) for side in row) for row in seam.sides)
-        if all((side.piece, side.edge) in edges for side in (*first, *second)):
+        if all(side.place in edges for side in (*first, *second)):
             seams.append(replace(seam, name=f"{seam.name} of the lining", sides=(first, second), notches=None))
     whole = replace(whole, seams=seams)
     for name, facings in faced.items():

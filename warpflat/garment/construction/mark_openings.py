@@ -12,6 +12,7 @@ from warpflat.core import FloatArray, InputError, find_unused_name, part_between
 from warpflat.garment.construction.button_stand import bust_depth, button_depths, with_button_stand, with_wrap
 from warpflat.garment.construction.edges import (
     ON,
+    added,
     changed,
     direction,
     downwards,
@@ -103,7 +104,7 @@ def _with_opening(pattern: Pattern, opening: Opening, part: OpeningPart, parts: 
         return _with_buttons(pattern, seam, opening, parts)
     if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0:
         raise InputError(f"a {opening.kind} begins at the lower end of a seam between two edges")
-    for side in [side for row in seam.sides for side in row if not side.mirrored]:
+    for side in [side for side in seam.stretches if not side.mirrored]:
         names = {edge.name for edge in pattern.piece(side.piece, pattern.sample).edges}
         if names & {f"{side.edge} {kind}" for kind in ("slit", "vent", "godet")}:
             raise InputError(f"the lower end of {seam.name!r} is open already")
@@ -114,7 +115,7 @@ def _with_opening(pattern: Pattern, opening: Opening, part: OpeningPart, parts: 
                     f"a {opening.kind} of {1e3 * opening.length:.0f} mm leaves nothing of the seam {seam.name!r}, "
                     f"{1e3 * whole:.0f} mm long; make it shorter, or leave the seam out of the form"
                 )
-        pattern = changed(pattern, (side.piece, side.edge), lambda piece, edge: _free_end(piece, edge, opening))
+        pattern = changed(pattern, side.place, lambda piece, edge: _free_end(piece, edge, opening))
     return _with_godet(pattern, seam, opening) if opening.kind == "godet" else pattern
 
 
@@ -142,7 +143,7 @@ def _with_zip(pattern: Pattern, seam: Seam, opening: Opening, parts: _Parts, *, 
     """Return a pattern with the line of a zip beside the edges of a seam, and a notch where it ends, if it does within the seam."""
     import shapely
 
-    for side in [side for row in seam.sides for side in row if not side.mirrored]:
+    for side in [side for side in seam.stretches if not side.mirrored]:
 
         def beside_edge(piece: Piece, edge: str = side.edge) -> Piece:
             row = parts[piece.size]
@@ -182,7 +183,7 @@ def _with_buttons(pattern: Pattern, seam: Seam, opening: Opening, parts: _Parts)
     """Return a pattern with a button stand on both sides of a seam, which is sewn only below it."""
     if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0 or opening.buttons is None:
         raise InputError("buttons begin at the upper end of a seam between two edges")
-    places = list(dict.fromkeys((side.piece, side.edge) for row in seam.sides for side in row))
+    places = list(dict.fromkeys(side.place for side in seam.stretches))
     name, edge = places[0]
     depths = dict[str, FloatArray]()
     # The sample size first: the others have as many buttons.
@@ -248,15 +249,16 @@ def _with_godet(pattern: Pattern, seam: Seam, opening: Opening) -> Pattern:
 
 def _with_wrap(pattern: Pattern, seam: Seam, opening: Opening) -> Pattern:
     """Return a pattern whose halves run beyond a centre line, each over the other; they are not sewn there, but tied."""
-    edges = {side.piece: side.edge for row in seam.sides for side in row}
+    edges = {side.piece: side.edge for side in seam.stretches}
     pattern = replace(pattern, seams=[each for each in pattern.seams if each.name != seam.name])
     wrapped = [with_wrap(piece, edge, opening) for name, edge in edges.items() for piece in in_sizes(pattern, name)]
     pattern = with_pieces(pattern, wrapped)
     if not opening.tie or any(piece.name == "tie" for piece in pattern.pieces[pattern.sample]):
         return pattern
-    like = pattern.pieces[pattern.sample][0]
-    tie = folded_strip("tie", like, opening.tie, TIE_WIDTH, role="tie", quantity=2, grain=(0.2, 0.5))
-    return with_pieces(pattern, [replace(tie, size=size) for size in pattern.pieces])
+    return added(
+        pattern,
+        lambda like: folded_strip("tie", like, opening.tie, TIE_WIDTH, role="tie", quantity=2, grain=(0.2, 0.5)),
+    )
 
 
 def _keyhole(piece: Piece, opening: Opening) -> Piece:

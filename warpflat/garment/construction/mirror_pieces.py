@@ -77,13 +77,33 @@ def draw_pairs_once(
     """
     from scipy.spatial.transform import Rotation
 
-    pairs = _find_pairs(pattern, garments, unlike)
+    # Mirror images in every size, with equal edges, and with seams that are mirror images too.
+    every = [set(garment.pairs) for garment in garments.values()]
+    pairs: list[_MirrorPair] = []
+    for first, second in next(iter(garments.values())).pairs:
+        if first in unlike or second in unlike or not all((first, second) in known for known in every):
+            continue
+        matched = [_matching_edges(garments[size], pattern.pieces[size], first, second) for size in garments]
+        if matched[0] is not None and all(edges == matched[0] for edges in matched):
+            pairs.append(_MirrorPair(name=second, of=first, edges=matched[0]))
+    # A piece that is sewn differently needs notches of its own; leaving it out may make others differ.
+    different = {""}
+    while different:
+        by_name = {pair.name: pair for pair in pairs}
+        different = {
+            part.piece
+            for seam in pattern.seams
+            for side in seam.sides
+            for part, drawn in zip(side, _replaced(side, by_name), strict=True)
+            if drawn.mirrored and _mirror_seam(drawn, pattern.seams, by_name) is None
+        }
+        pairs = [pair for pair in pairs if pair.name not in different]
     if not pairs:
         return pattern, ()
     (garment, *_), points, images = garments.values(), list[FloatArray](), list[FloatArray]()
     for pair in pairs:
         partners = garment.mirror_vertices(pair.of, pair.name)
-        assert partners is not None  # _find_pairs has found them
+        assert partners is not None  # they are a pair
         points.append(garment.pieces[pair.of].network.surface.vertices)
         images.append(garment.pieces[pair.name].network.surface.vertices[partners])
     normal, off = mirror_plane(np.concatenate(points), np.concatenate(images))
@@ -103,31 +123,6 @@ def draw_pairs_once(
     return replace(pattern, pieces=pieces, seams=_sewn_once(pattern.seams, pairs)), notes
 
 
-def _find_pairs(pattern: Pattern, garments: Mapping[str, Garment], unlike: Collection[str]) -> tuple[_MirrorPair, ...]:
-    """Find pieces that are mirror images in every size, with equal edges, and whose seams are mirror images too."""
-    every = [set(garment.pairs) for garment in garments.values()]
-    found: list[_MirrorPair] = []
-    for first, second in next(iter(garments.values())).pairs:
-        if first in unlike or second in unlike or not all((first, second) in pairs for pairs in every):
-            continue
-        matched = [_matching_edges(garments[size], pattern.pieces[size], first, second) for size in garments]
-        if matched[0] is not None and all(edges == matched[0] for edges in matched):
-            found.append(_MirrorPair(name=second, of=first, edges=matched[0]))
-    # A piece that is sewn differently needs notches of its own; leaving it out may make others differ.
-    while True:
-        by_name = {pair.name: pair for pair in found}
-        different = {
-            part.piece
-            for seam in pattern.seams
-            for side in seam.sides
-            for part, drawn in zip(side, _replaced(side, by_name), strict=True)
-            if drawn.mirrored and _mirror_seam(drawn, pattern.seams, by_name) is None
-        }
-        if not different:
-            return tuple(found)
-        found = [pair for pair in found if pair.name not in different]
-
-
 def _sewn_once(seams: Sequence[Seam], mirror_pairs: Sequence[_MirrorPair]) -> tuple[Seam, ...]:
     """Replace the edges of pieces that are not drawn by those of the pieces that are.
 
@@ -142,7 +137,7 @@ def _sewn_once(seams: Sequence[Seam], mirror_pairs: Sequence[_MirrorPair]) -> tu
             sewn.append(seam)
             continue
         image = _mirror_seam(mirrored[0], seams, by_name)
-        assert image is not None  # _find_pairs sees to it
+        assert image is not None  # draw_pairs_once sees to it
         other, place = image
         ease, (first, last) = seam.ease, seam.eased
         if next(number for number in (0, 1) if mirrored[0] in sides[number]) != place:

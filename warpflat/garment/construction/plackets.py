@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from warpflat.garment.construction.edges import (
     ON,
     ON_EDGE,
     Place,
+    added,
     direction,
     drawn_on,
     edge_at,
@@ -21,7 +21,6 @@ from warpflat.garment.construction.edges import (
     redrawn,
     side_points,
     up_and_across,
-    with_pieces,
 )
 from warpflat.garment.construction.free_edges import Break, free_chain, marks_of, split_edge
 from warpflat.garment.construction.strips import folded_strip
@@ -77,11 +76,13 @@ def with_slits(pattern: Pattern, places: Sequence[Place], length: float, called:
     count = sum(pattern.piece(name, pattern.sample).quantity for name, _ in places)
     title = free_piece_name(pattern, f"{called}_placket")
     turned_in = {"lower": _TURNED_IN, "upper": _TURNED_IN}
-    like = pattern.pieces[pattern.sample][0]
-    binding = folded_strip(
-        title, like, 2.0 * length + _LONGER, _BINDING, role="placket", quantity=count, allowance=turned_in, grain=(0.1, 1.0)
-    )  # fmt: skip
-    return with_pieces(pattern, [replace(binding, size=size) for size in pattern.pieces]), breaks
+
+    def binding(like: Piece) -> Piece:
+        return folded_strip(
+            title, like, 2.0 * length + _LONGER, _BINDING, role="placket", quantity=count, allowance=turned_in, grain=(0.1, 1.0)
+        )  # fmt: skip
+
+    return added(pattern, binding), breaks
 
 
 def with_placket(pattern: Pattern, places: Sequence[Place], length: float, called: str) -> tuple[Pattern, list[Break]]:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core import FloatArray, IntArray, find_unused_name
+from warpflat.flat import chain_lines
 from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LINES, RING_LEVELS
 
 if TYPE_CHECKING:
@@ -152,25 +153,11 @@ def find_rings(
                 for (a, b), length in zip(itertools.pairwise(row.tolist()), lengths, strict=True):
                     border.setdefault((min(a, b), max(a, b)), []).append(length)
     free = {ends: lengths[0] for ends, lengths in border.items() if len(lengths) == 1}
-    neighbours: dict[int, list[int]] = {}
-    for a, b in free:
-        neighbours.setdefault(a, []).append(b)
-        neighbours.setdefault(b, []).append(a)
-    rings, seen = [], set[int]()
-    for start in sorted(neighbours):
-        walk, here = [start], start
-        while start not in seen and len(neighbours[here]) == 2:
-            onward = [vertex for vertex in neighbours[here] if vertex not in walk[-2:]]
-            if not onward or onward[0] == start:
-                break
-            here = onward[0]
-            walk.append(here)
-            if here in seen:
-                break
-        seen.update(walk)
-        ends = [tuple(sorted(pair)) for pair in itertools.pairwise([*walk, start])]
-        if len(walk) > 2 and all(pair in free for pair in ends):
-            rings.append((np.array(walk, dtype=np.int32), sum(free[a, b] for a, b in ends)))
+    rings = []
+    for chain in chain_lines(sorted(free)):
+        if chain[0] == chain[-1]:
+            length = sum(free[min(pair), max(pair)] for pair in itertools.pairwise(chain))
+            rings.append((np.array(chain[:-1], dtype=np.int32), length))
     return sorted(rings, key=lambda ring: -ring[1])
 
 

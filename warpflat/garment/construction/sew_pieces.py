@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from warpflat.core import BoolArray, FloatArray, InputError, arc_lengths, find_unused_name, polyline_length
+from warpflat.core import BoolArray, FloatArray, InputError, arc_lengths, find_unused_name
 from warpflat.flat import (
     SAME_PLACE,
     BorderSeam,
@@ -107,8 +107,8 @@ def sew_pieces(
         )
     if longer:
         full = [FullEdge(vertices=row, factor=seam.named.factor, gathered=seam.named.gathered) for seam, row in longer]
-        plain = [row for seam in found for row in seam.vertices if not any(row is edge.vertices for edge in full)]
-        flat[first] = give_fullness(flat[first], full, plain, options=options)
+        rows = [row for seam in found for row in seam.vertices]
+        flat[first] = give_fullness(flat[first], full, rows, options=options)
     pairs = [
         Stitching(
             name=title, pieces=(name, name), vertices=(seam.left, seam.right),
@@ -124,13 +124,8 @@ def sew_pieces(
         )
         for seam in found
     ]  # fmt: skip
-    sewn_edges = {
-        (name, min(edge), max(edge))
-        for pair in pairs
-        for name, row in zip(pair.pieces, pair.vertices, strict=True)
-        for edge in pairwise(row.tolist())
-    }
-    for pair in meeting_borders({name: piece.network.surface for name, piece in flat.items()}, without=sewn_edges):
+    borders = {name: piece.network.surface for name, piece in flat.items()}
+    for pair in meeting_borders(borders, without=_sewn_edges(pairs)):
         if len(flat) > 1:
             if eased and pair.pieces[0] != pair.pieces[1]:
                 for part in _between_corners(pair, flat):
@@ -162,14 +157,18 @@ def sew_pieces(
         flat |= sewn.pieces
         sewn = replace(sewn, pieces=flat)
     # What is sewn to a straight band keeps its length; the band is stretched to it.
-    for number, pair in enumerate(pairs):
-        if not straight.keys().isdisjoint(pair.pieces):
-            one, other = (
-                polyline_length(flat[piece].positions[row])
-                for piece, row in zip(pair.pieces, pair.vertices, strict=True)
-            )
-            pairs[number] = replace(pair, ratio=one / other, eased=True)
+    pairs = [pair if straight.keys().isdisjoint(pair.pieces) else pair.as_laid(flat) for pair in pairs]
     return Garment(name=name or first, pieces=flat, stitching=pairs, border_seams=seams, sewn=sewn)
+
+
+def _sewn_edges(pairs: Sequence[Stitching]) -> set[tuple[str, int, int]]:
+    """Return the edges that are sewn, by piece and vertices, the lower first."""
+    return {
+        (name, min(edge), max(edge))
+        for pair in pairs
+        for name, row in zip(pair.pieces, pair.vertices, strict=True)
+        for edge in pairwise(row.tolist())
+    }
 
 
 def _between_corners(pair: Stitching, flat: Mapping[str, Flattening]) -> list[Stitching]:
@@ -298,16 +297,10 @@ def meeting_borders(
 
 def unsewn_notes(garment: Garment) -> list[str]:
     """Return a note on each stretch of border of meshes that runs along another and is not sewn, and on how many more there are."""
-    sewn = {
-        (name, min(edge), max(edge))
-        for pair in garment.stitching
-        for name, row in zip(pair.pieces, pair.vertices, strict=True)
-        for edge in pairwise(row.tolist())
-    }
     joined = {name for pair in garment.stitching if pair.pieces[0] != pair.pieces[1] for name in pair.pieces}
     found = unsewn_borders(
         {name: piece.network.surface for name, piece in garment.pieces.items()},
-        without=sewn,
+        without=_sewn_edges(garment.stitching),
         alone=garment.pieces.keys() - joined,
     )
     left = len(found) - _MOST_TOLD

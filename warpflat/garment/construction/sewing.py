@@ -13,7 +13,7 @@ up to the energy that all constraints together have cost; `Sewn.cost` is that en
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,7 +31,6 @@ from warpflat.flat import (
     Relaxation,
     RelaxOptions,
     SpringNetwork,
-    Stage,
     cut_sides,
     factor_pays,
     falloff_weights,
@@ -42,13 +41,13 @@ from warpflat.flat import (
     join_equations,
     join_networks,
     join_surfaces,
+    make_stage,
     one_group,
     overlap_area,
     relax_under_equations,
     seam_equations,
     smooth_equations,
     stiffness_matrix,
-    strain_energy,
     stretch_equations,
 )
 from warpflat.garment.construction.constraints import (
@@ -94,13 +93,65 @@ class SewingNetwork:
         """Return the numbers of a piece's vertices in the joined mesh."""
         return np.asarray(vertices, dtype=np.int32) + np.int32(self.first[name])
 
-    def network(self) -> SpringNetwork:
-        """Return the springs and cells of all pieces as one network on their device, not sewn yet.
+    def network(
+        self,
+        folds: Mapping[str, IntArray],
+        equations: ConstraintEquations,
+        options: RelaxOptions,
+        offsets: Iterable[tuple[IntArray, FloatArray]],
+    ) -> SpringNetwork:
+        """Return the springs and cells of all pieces as one network on their device, sewn by equations.
 
         All pieces come to rest together.
+
+        Args:
+            folds: by piece, vertices that must lie on one upright line.
+            equations: of seams and constraints.
+            options: of the relaxation.
+            offsets: of some equations, their numbers and the offsets with which they begin [m].
         """
         # A copy: a single piece's own network must not stay sewn.
-        return replace(join_networks([piece.network for piece in self.pieces.values()]))
+        network = replace(join_networks([piece.network for piece in self.pieces.values()]))
+        if folds:
+            network.keep_vertical(np.concatenate([self.numbers(name, ids) for name, ids in folds.items()]))
+        if len(equations):
+            thread = max(network.fabric.stiffness_warp, network.fabric.stiffness_weft)
+            median = float(np.median(network.spring_arrays.listed_stiffness))
+            relative = _RELATIVE_STIFFNESS if factor_pays(network, options) else _STIFFNESS_FOR_STEPS
+            stiffness = np.where(equations.soft > 0, equations.soft * thread, relative * median)
+            network.sew(
+                equations.ends, equations.ratio, stiffness, kind=equations.kind, target=equations.target,
+                coefficient=equations.coefficient,
+            )  # fmt: skip
+            assert network.seams is not None
+            offset = network.seams.offset.numpy().copy()
+            for numbers, known in offsets:
+                offset[numbers] = known
+            network.seams.offset.assign(offset)
+        return network
+
+    def fold_results(
+        self, state: Relaxation, unsewn: FloatArray, folds: Mapping[str, IntArray]
+    ) -> Iterator[ConstraintResult]:
+        """Yield folds with their costs, by the forces of the lines that hold them.
+
+        Args:
+            state: at rest.
+            unsewn: #V by 2, where the pieces lay on their own [m].
+            folds: by piece, vertices on one upright line.
+        """
+        if not folds:
+            return
+        position, freedom = state.positions(), state.network.bonds.freedom
+        saved = freedom.numpy().copy()
+        freedom.fill_(wp.vec2d(1.0, 1.0))
+        force = state.forces()
+        freedom.assign(saved)
+        for name, ids in folds.items():
+            line = self.numbers(name, ids)
+            moved = position[line, 0] - unsewn[line, 0]
+            cost, bend = -0.5 * float(force[line, 0] @ (moved - moved.mean())), float(np.ptp(position[line, 0]))
+            yield ConstraintResult(name=f"{name} fold", kind="fold", cost=cost, violation=bend)
 
     def overlaps(self, layout: FloatArray) -> dict[str, float]:
         """Return by name the area that each piece that lies over itself in a layout (#V by 2 [m]) covers more than once [m2]."""
@@ -135,19 +186,8 @@ class SewingNetwork:
             stages = list(piece.stages)
             for stage, place, end in ends:
                 energies = Relaxation(piece.network, state.options, start=place[rows]).energies()
-                stages.append(
-                    Stage(
-                        name=stage,
-                        model_energy_j=energies.potential,
-                        guard_energy_j=energies.guard,
-                        strain_energy_j=strain_energy(piece.network, place[rows]),
-                        steps=end.steps,
-                        work_units=end.work_units,
-                        seconds=end.seconds,
-                        converged=end.converged,
-                        residual=None if np.isnan(end.residual) else end.residual,
-                    )
-                )
+                own = replace(end, energies=energies, left=None)
+                stages.append(make_stage(stage, piece.network, place[rows], own))
             sewn[name] = replace(piece, positions=layout[rows], stages=tuple(stages), unsewn=piece.unsewn or piece)
         return sewn
 
@@ -182,30 +222,14 @@ def sew(
     unsewn = np.concatenate([piece.positions for piece in pieces.values()])
     equations, kinds, oriented = _constraint_equations(joined, unsewn, seams, constraints, folds)
     start = np.concatenate([_straighten_fold(piece, folds.get(name)) for name, piece in pieces.items()])
-    network = joined.network()
-    if folds:
-        network.keep_vertical(np.concatenate([joined.numbers(name, ids) for name, ids in folds.items()]))
-    if len(equations):
-        thread = max(network.fabric.stiffness_warp, network.fabric.stiffness_weft)
-        median = float(np.median(network.spring_arrays.listed_stiffness))
-        relative = _RELATIVE_STIFFNESS if factor_pays(network, options) else _STIFFNESS_FOR_STEPS
-        stiffness = np.where(equations.soft > 0, equations.soft * thread, relative * median)
-        network.sew(
-            equations.ends,
-            equations.ratio,
-            stiffness,
-            kind=equations.kind,
-            target=equations.target,
-            coefficient=equations.coefficient,
-        )
-        # Begin with the offsets that are known of the same equations.
-        known = offsets or {}
-        assert network.seams is not None
-        offset = network.seams.offset.numpy().copy()
-        for key, numbers in _held(equations, kinds):
-            if len(known.get(key, ())) == len(numbers):
-                offset[numbers] = known[key]
-        network.seams.offset.assign(offset)
+    # By kind and name of every group the numbers of those of its equations that have offsets; begin with those that are known.
+    lasting, known = (equations.soft == 0) | (equations.share > 0), offsets or {}
+    held = [
+        ((kind, name), np.flatnonzero(lasting & (equations.group == number)).astype(np.int32))
+        for number, (name, kind) in enumerate(kinds)
+    ]
+    begun = [(numbers, known[key]) for key, numbers in held if len(known.get(key, ())) == len(numbers)]
+    network = joined.network(folds, equations, options, begun)
     # A piece with a guided line needs nothing else to hold it: the line cannot turn.
     alignments = [
         part
@@ -250,20 +274,8 @@ def sew(
     offsets = dict[tuple[str, str], FloatArray]()
     if state.network.seams is not None:
         offset = state.network.seams.offset.numpy()
-        offsets = {key: offset[numbers] for key, numbers in _held(equations, kinds)}
-    of_folds = []
-    if folds:
-        # Folds with their costs, by the forces of the lines that hold them.
-        position, freedom = state.positions(), state.network.bonds.freedom
-        saved = freedom.numpy().copy()
-        freedom.fill_(wp.vec2d(1.0, 1.0))
-        force = state.forces()
-        freedom.assign(saved)
-        for name, ids in folds.items():
-            line = joined.numbers(name, ids)
-            moved = position[line, 0] - unsewn[line, 0]
-            cost, bend = -0.5 * float(force[line, 0] @ (moved - moved.mean())), float(np.ptp(position[line, 0]))
-            of_folds.append(ConstraintResult(name=f"{name} fold", kind="fold", cost=cost, violation=bend))
+        offsets = {key: offset[numbers] for key, numbers in held}
+    of_folds = list(joined.fold_results(state, unsewn, folds))
     return Sewn(
         pieces=sewn,
         converged=converged,
@@ -275,15 +287,6 @@ def sew(
         seconds=seconds,
         offsets=offsets,
     )
-
-
-def _held(
-    equations: ConstraintEquations, kinds: Sequence[tuple[str, str]]
-) -> Iterator[tuple[tuple[str, str], IntArray]]:
-    """Yield kind and name of every group, and the numbers of those of its equations that have offsets."""
-    lasting = (equations.soft == 0) | (equations.share > 0)
-    for number, (name, kind) in enumerate(kinds):
-        yield (kind, name), np.flatnonzero(lasting & (equations.group == number)).astype(np.int32)
 
 
 def _constraint_equations(

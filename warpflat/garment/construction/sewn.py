@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from warpflat.core import FloatArray, IntArray
+from warpflat.core import FloatArray, IntArray, polyline_length
 from warpflat.flat import Flattening
 
 __all__ = ["ConstraintResult", "MeasuredSeam", "Sewn", "Stitching"]
@@ -33,6 +33,13 @@ class Stitching:
     joints: IntArray | None = None
     eased: bool = False
     sides: tuple[str, str] | None = None
+
+    def as_laid(self, pieces: Mapping[str, Flattening]) -> Stitching:
+        """Return it eased to what its two sides measure in the layouts of their pieces."""
+        one, other = (
+            polyline_length(pieces[piece].positions[row]) for piece, row in zip(self.pieces, self.vertices, strict=True)
+        )
+        return replace(self, ratio=one / other, eased=True)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -32,7 +32,7 @@ from warpflat.garment.construction.edges import (
     up_and_across,
     with_pieces,
 )
-from warpflat.garment.construction.facings import INNER, centre_notch, sewn_alike, strip_along, strip_piece
+from warpflat.garment.construction.facings import INNER, centre_notch, sewn_alike, sewn_inside, strip_along, strip_piece
 from warpflat.garment.construction.free_edges import free_chains
 from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
 
@@ -109,7 +109,7 @@ def with_shaped_waistband(
 
         def banded(piece: Piece, edge: str = edge, title: str = title) -> tuple[Piece, Piece]:
             strip = strip_along(piece, [edge], width)
-            band = [replace(part, kind="seam", allowance=None) if part.name == INNER else part for part in strip]
+            band = sewn_inside(strip)
             middle = np.concatenate([part.points for part in band]).mean(axis=0)
             # Twice as often as its piece: the outside and its facing.
             return without_strip(piece, strip, f"{edge} seam"), strip_piece(
@@ -200,7 +200,7 @@ def slant_rises(
             arc = np.unique(np.concatenate([arc, np.linspace(0.0, arc[-1], _SLANTED)]))
             along = np.clip(begin + (arc[-1] - arc if side.reversed else arc), at[0], at[-1])
             wide = PchipInterpolator(at, values)(along) if len(at) > 1 else np.full(len(arc), values[0])
-            if np.abs(found.setdefault((side.piece, side.edge), (arc, wide))[1] - wide).max() > ON_EDGE:
+            if np.abs(found.setdefault(side.place, (arc, wide))[1] - wide).max() > ON_EDGE:
                 raise InputError(
                     f"{side.piece} is cut on the fold or twice, and cannot be shorter on one side; with half = false it is cut whole"
                 )
@@ -240,7 +240,7 @@ def _with_moved_notches(
 ) -> Seam:
     """Return a seam whose given notches keep their places on the cloth where its upper end is cut off."""
     side = seam.sides[0][0]
-    if seam.notches is None or (side.piece, side.edge) not in cut or len(seam.sides[0]) > 1:
+    if seam.notches is None or side.place not in cut or len(seam.sides[0]) > 1:
         return seam
     # The strip lies at the start of the edge after the waist, and at the end of the one before it.
     at_start, width, by_size = cut[side.piece, side.edge][1] != side.reversed, widths[side.piece, side.edge], {}

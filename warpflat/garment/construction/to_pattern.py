@@ -41,6 +41,7 @@ from warpflat.garment.construction.closed_cuts import CLOSED, are_closed, close_
 from warpflat.garment.construction.darts import pleat_depths
 from warpflat.garment.construction.ease import measure_ease
 from warpflat.garment.construction.edge_rules import EdgeRules
+from warpflat.garment.construction.edges import lengths_of, with_pieces
 from warpflat.garment.construction.equal_pieces import draw_equal_pieces_once
 from warpflat.garment.construction.facings import STAND, Stand
 from warpflat.garment.construction.finishing import finish_edges, hem_rises
@@ -201,7 +202,16 @@ def pattern_of_garment(
         seams.append(seam)
     pattern = replace(pattern, seams=tuple(seams))
     if sample.as_cut is not None:
-        pattern = _through_vertices(pattern)
+        # What was cut is as long as the curves through the vertices of its edges, not as their chords.
+        curved = []
+        for piece in pattern:
+            lines = [edge.points if edge.kind == "fold" else curve_through(edge.points) for edge in piece.edges]
+            edges = [
+                edge if len(points) == len(edge.points) else replace(edge, points=points, vertices=None)
+                for edge, points in zip(piece.edges, lines, strict=True)
+            ]
+            curved.append(replace(piece, edges=edges))
+        pattern = with_pieces(pattern, curved)
     if laid:
         with optional_step(_NO_DRAWING, is_needed=False):
             worn = describe_worn(laid, pattern.sample, rises, pattern.pieces[pattern.sample])
@@ -234,7 +244,16 @@ def _drawn_of_meshes(sample: Garment, name: str, rules: EdgeRules, *, twice: boo
     # Where a side was cut longer than the other, as on a band that is stretched, it is eased in.
     as_laid = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased}
     stretched = {frozenset(pair.pieces) for pair in sample.stitching if pair.eased and np.any(pair.ratio != 1.0)}
-    seams = [replace(_eased(seam, pattern, stretched), as_laid=_pieces_of(seam) in as_laid) for seam in pattern.seams]
+    seams = list[Seam]()
+    for seam in pattern.seams:
+        joined = frozenset(side.piece for side in seam.stretches)
+        if joined in stretched:
+            # Its longer side is the last one.
+            first, second = sorted(seam.sides, key=lambda row: sum(lengths_of(pattern, row)))
+            one, other = sum(lengths_of(pattern, first)), sum(lengths_of(pattern, second))
+            if other - one > SEAM_TOLERANCE:
+                seam = replace(seam, sides=(first, second), ease=other / one - 1.0)
+        seams.append(replace(seam, as_laid=joined in as_laid))
     drawn_for_others = twice and len(sample.pieces) > 1 and sample.parts.keys() == sample.pieces.keys()
     return _Drawn(
         pattern=replace(pattern, seams=seams), notes=notes,
@@ -306,7 +325,7 @@ def _drawn_on_forms(
     cut = one_sided(sample.openings)
     rows = zip(sample.openings, placed[next(iter(garments))], strict=True)
     parted = {part.seam for opening, parts in rows for part in parts if opening in cut}
-    unlike = {side.piece for seam in seams if seam.name in parted for row in seam.sides for side in row}
+    unlike = {side.piece for seam in seams if seam.name in parted for side in seam.stretches}
     slanted = {wish.edge for wish in sample.finishing if wish.is_one_sided}
     unlike |= {piece.name for piece in pieces[next(iter(pieces))] for edge in piece.edges if edge.name in slanted}
     notes = tuple(
@@ -316,25 +335,6 @@ def _drawn_on_forms(
     pattern = Pattern(name=name, pieces=pieces, seams=seams, sample_size=sample_size)
     # Of the pieces of a form no others are equal: godets are.
     return _Drawn(pattern=pattern, notes=notes, laid=laid, unlike=unlike, placed=placed, alike="godet")
-
-
-def _pieces_of(seam: Seam) -> frozenset[str]:
-    """Return the names of the pieces that a seam joins."""
-    return frozenset(side.piece for row in seam.sides for side in row)
-
-
-def _eased(seam: Seam, pattern: Pattern, stretched: Collection[frozenset[str]]) -> Seam:
-    """Return a seam of pieces that are stretched to each other with its longer side last, eased to the other."""
-    if _pieces_of(seam) not in stretched:
-        return seam
-    first, second = sorted(
-        seam.sides,
-        key=lambda row: sum(pattern.piece(side.piece, pattern.sample).edge(side.edge).length for side in row),
-    )
-    one, other = (
-        sum(pattern.piece(side.piece, pattern.sample).edge(side.edge).length for side in row) for row in (first, second)
-    )
-    return replace(seam, sides=(first, second), ease=other / one - 1.0) if other - one > SEAM_TOLERANCE else seam
 
 
 def _form_piece(
@@ -393,22 +393,6 @@ def _form_piece(
         ),
     )
     return replace(drawn, placement=_placement(drawn, flat))
-
-
-def _through_vertices(pattern: Pattern) -> Pattern:
-    """Return the pattern with edges that run through their vertices as curves: what was cut is as long as these, not as their chords."""
-
-    def drawn(edge: Edge) -> Edge:
-        points = edge.points if edge.kind == "fold" else curve_through(edge.points)
-        return edge if len(points) == len(edge.points) else replace(edge, points=points, vertices=None)
-
-    return replace(
-        pattern,
-        pieces={
-            size: [replace(piece, edges=[drawn(edge) for edge in piece.edges]) for piece in row]
-            for size, row in pattern.pieces.items()
-        },
-    )
 
 
 def _placement(piece: Piece, flat: Flattening) -> FloatArray | None:
@@ -703,7 +687,7 @@ def _mesh_seams(
     from scipy.spatial import cKDTree
 
     seams: list[Seam] = [*named]
-    done = {(side.piece, side.edge) for seam in named for row in seam.sides for side in row}
+    done = {side.place for seam in named for side in seam.stretches}
     rows: list[tuple[tuple[SeamSide, ...], FloatArray]] = []
     for result, piece in zip(results, pieces, strict=True):
         vertices, count = result.network.surface.vertices, len(piece.edges)
@@ -736,7 +720,7 @@ def _mesh_seams(
     for (first, curve), (second, other) in sorted(
         pairs, key=lambda pair: (len(pair[0][0]) + len(pair[1][0]), order[pair[0][0]])
     ):
-        taken = [(side.piece, side.edge) for side in (*first, *second)]
+        taken = [side.place for side in (*first, *second)]
         if len(set(taken)) < len(taken) or not done.isdisjoint(taken):
             continue
         against = not are_one(curve, other)
@@ -761,12 +745,7 @@ def _lacking_seams(garment: Garment, pattern: Pattern) -> list[tuple[Stitching, 
         for name, piece in garment.pieces.items()
         for part in (separate(piece) if piece.cuts else (piece,))
     }
-    seam_of = {
-        (side.piece, side.edge): number
-        for number, seam in enumerate(pattern.seams)
-        for row in seam.sides
-        for side in row
-    }
+    seam_of = {side.place: number for number, seam in enumerate(pattern.seams) for side in seam.stretches}
     # Each mesh edge of an outline, by its piece and its ends in the layout: the number of its seam, -1 for none; None if it is meant to
     # be in none.
     sewn: dict[tuple[str, frozenset[bytes]], int | None] = {}

@@ -7,8 +7,8 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from warpflat.core import FloatArray, InputError, IntArray, polyline_length
-from warpflat.garment.draping.mesh_pieces import FlatMesh, Weld
+from warpflat.core import FloatArray, InputError, IntArray, polyline_length, project_on_segments, turned_left, unit
+from warpflat.garment.draping.mesh_pieces import FlatMesh, MeshedPieces, Weld
 
 __all__ = ["continue_pieces", "hang_from_edges", "hood_beside_head"]
 
@@ -34,10 +34,7 @@ def _joins(welds: Sequence[Sequence[Weld]]) -> list[tuple[tuple[str, str], tuple
 
 
 def continue_pieces(
-    placed: Mapping[str, FloatArray],
-    meshes: Mapping[str, FlatMesh],
-    welds: Sequence[Sequence[Weld]],
-    turned_down: Collection[str] = (),
+    placed: Mapping[str, FloatArray], meshed: MeshedPieces, turned_down: Collection[str] = ()
 ) -> dict[str, FloatArray]:
     """Place bands, collars, pockets and whatever else was drafted flat: as if the cloth that they are sewn to ran on beyond the seam.
 
@@ -45,18 +42,17 @@ def continue_pieces(
 
     Args:
         placed: by piece the points (#P by 3 [m]) of those that lie.
-        meshes: all pieces.
-        welds: for each seam the vertices that it joins.
+        meshed: all pieces.
         turned_down: pieces that lie back on what they are sewn to, as the fall of a collar on its stand.
 
     Raises:
         InputError: a piece hangs together with none that lies.
     """
-    found = dict(placed)
+    found, meshes = dict(placed), meshed.meshes
     while lost := [name for name in meshes if name not in found]:
         # By piece its vertices that are sewn, the places of these, and where the piece's x and y lead from there.
         sewn: dict[str, list[tuple[IntArray, FloatArray, FloatArray]]] = {name: [] for name in lost}
-        for (name, other), (own, its) in _joins(welds):
+        for (name, other), (own, its) in _joins(meshed.welds):
             if name in lost and other in found:
                 across = _border_frames(meshes[name], own).transpose(0, 2, 1)
                 # Into this piece is out of the other one, or back into it.
@@ -79,24 +75,21 @@ def continue_pieces(
 
 
 def hang_from_edges(
-    placed: Mapping[str, FloatArray],
-    meshes: Mapping[str, FlatMesh],
-    welds: Sequence[Sequence[Weld]],
-    falling: Mapping[str, float],
+    placed: Mapping[str, FloatArray], meshed: MeshedPieces, falling: Mapping[str, float]
 ) -> dict[str, FloatArray]:
     """Place flounces and ruffles as a smooth skirt that falls from the edges to which they are sewn, without their folds.
 
     Args:
         placed: by piece the points (#P by 3 [m]) of those that lie.
-        meshes: all pieces.
-        welds: for each seam the vertices that it joins.
+        meshed: all pieces.
         falling: the pieces that are placed, with the share of its length by which each stands out.
 
     Returns:
         By piece its points, #P by 3 [m].
     """
+    meshes = meshed.meshes
     rows: dict[str, list[tuple[IntArray, FloatArray, FloatArray]]] = {name: [] for name in falling}
-    for (name, other), (own, its) in _joins(welds):
+    for (name, other), (own, its) in _joins(meshed.welds):
         if name in falling and other in placed:
             out = -_border_frames(meshes[other], its)[:, :, 1:]
             down = (_slopes(meshes[other], placed[other])[its] @ out)[:, :, 0]
@@ -109,10 +102,7 @@ def hang_from_edges(
         flat, best = meshes[name].points, np.full(len(meshes[name].points), np.inf)
         found[name] = np.empty((len(flat), 3))
         for own, place, down in seams:
-            a, b = flat[own[:-1]], flat[own[1:]]
-            share = np.einsum("psk,sk->ps", flat[:, None] - a, b - a) / np.maximum(((b - a) ** 2).sum(axis=1), 1e-12)
-            share = np.clip(share, 0.0, 1.0)
-            off = np.linalg.norm(flat[:, None] - a - share[..., None] * (b - a), axis=2)
+            share, off = project_on_segments(flat[:, None], flat[own[:-1]], flat[own[1:]])
             nearest_side = off.argmin(axis=1)
             points, here = np.arange(len(flat)), off.min(axis=1) < best
             at, t = nearest_side[here], share[points, nearest_side][here, None]
@@ -120,34 +110,28 @@ def hang_from_edges(
             # On the trunk it hangs, on an arm it runs on.
             way = np.where((way[:, 1] < _HANGS * np.linalg.norm(way, axis=1))[:, None], [0.0, -1.0, 0.0], way)
             out = (start - middle) * [1.0, 0.0, 1.0]
-            way = way + falling[name] * out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
-            way /= np.linalg.norm(way, axis=1, keepdims=True)
             best = np.minimum(best, off.min(axis=1))
-            found[name][here] = start + best[here, None] * way
+            found[name][here] = start + best[here, None] * unit(way + falling[name] * unit(out))
     return found
 
 
 def hood_beside_head(
-    placed: Mapping[str, FloatArray],
-    meshes: Mapping[str, FlatMesh],
-    welds: Sequence[Sequence[Weld]],
-    hood: Collection[str],
-    beside: float,
+    placed: Mapping[str, FloatArray], meshed: MeshedPieces, hood: Collection[str], beside: float
 ) -> dict[str, FloatArray]:
     """Place the halves of a hood flat beside a head, upright as they are drawn, with the middles of their seams at the neckline's.
 
     Args:
         placed: by piece the points (#P by 3 [m]) of those that lie.
-        meshes: all pieces.
-        welds: for each seam the vertices that it joins.
+        meshed: all pieces.
         hood: the pieces of the hood; what is sewn to both sides of the neckline, such as a strip over the crown, is no half.
         beside: how far from the middle the halves lie [m].
 
     Returns:
         By half its points, #P by 3 [m].
     """
+    meshes = meshed.meshes
     rows: dict[str, list[tuple[IntArray, FloatArray]]] = {name: [] for name in hood}
-    for (name, other), (own, its) in _joins(welds):
+    for (name, other), (own, its) in _joins(meshed.welds):
         if name in hood and other in placed and other not in hood:
             rows[name].append((own, placed[other][its]))
     found = {}
@@ -169,9 +153,8 @@ def hood_beside_head(
 def _border_frames(mesh: FlatMesh, row: IntArray) -> FloatArray:
     """Return the directions along a row of border vertices (#R) and into the piece as columns, #R by 2 by 2."""
     points = mesh.points
-    along = np.gradient(points[row], axis=0)
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
-    inwards = np.column_stack([-along[:, 1], along[:, 0]])
+    along = unit(np.gradient(points[row], axis=0))
+    inwards = turned_left(along)
     middle = points[mesh.triangles[np.isin(mesh.triangles, row).sum(axis=1) == 2]].mean(axis=1)
     place = cKDTree(points[row]).query(middle)[1]
     left = np.einsum("ta,ta->t", middle - points[row[place]], inwards[place])

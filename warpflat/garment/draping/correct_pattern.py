@@ -17,7 +17,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_array, csc_array, diags_array
+from scipy.sparse import csc_array, diags_array
 
 from warpflat.core import (
     FloatArray,
@@ -26,6 +26,8 @@ from warpflat.core import (
     factor_symmetric,
     polyline_length,
     short_repr,
+    turned_left,
+    unit,
     weighted_percentiles,
 )
 from warpflat.flat import Fabric, Flattening, border_edges, corner_triangles
@@ -33,6 +35,7 @@ from warpflat.garment.construction.garment import Garment
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.drape_garment import held_vertices
 from warpflat.garment.draping.moved_pattern import (
+    cell_matrix,
     hold_seams,
     largest_share,
     seam_differences,
@@ -93,9 +96,8 @@ class Correction:
         along = old.flat[edges[:, 1]] - old.flat[edges[:, 0]]
         outwards = np.zeros_like(old.flat)
         for end in range(2):
-            np.add.at(outwards, edges[:, end], np.column_stack([along[:, 1], -along[:, 0]]))
-        length = np.linalg.norm(outwards, axis=1, keepdims=True)
-        across = np.einsum("ij,ij->i", new.flat - old.flat, outwards / np.maximum(length, 1e-30))
+            np.add.at(outwards, edges[:, end], -turned_left(along))
+        across = np.einsum("ij,ij->i", new.flat - old.flat, unit(outwards))
         return {name: across[rows] for name, rows in old.piece_vertices.items()}
 
     def edges(self, garment: Garment | Flattening) -> dict[str, dict[str, float]]:
@@ -306,27 +308,25 @@ def _follow(
         wanted: #C by 3, strains.
         seams, difference: as :func:`_gauss_newton_step` takes them.
     """
-    corner, face, gradient, area = cloth.cells()
+    _, face, gradient, area = cloth.cells()
     corner_flat, _, _ = corner_triangles(cloth.flat_faces)
     fabric = cloth.fabric
     threads = 0.5 * (fabric.stiffness_warp + fabric.stiffness_weft)
     shear = max(fabric.shear_stiffness, _LEAST_SHEAR * threads)
     warp, weft = cloth.warp[face][:, None, :], cloth.weft[face][:, None, :]
     by_warp, by_weft = gradient[:, :, :1], gradient[:, :, 1:]
-    # #C by 3 corners by 2 coordinates, for the strain along warp, along weft and in shear.
-    rows = [warp * by_warp, weft * by_weft, warp * by_weft + weft * by_warp]
-    count, cells = 2 * len(cloth.flat), len(corner)
-    columns = (2 * corner_flat[:, :, None] + np.arange(2)).reshape(cells, 6)
+    # How the strain along warp, along weft and in shear follows the corners of each cell: 3 by #C by 3 corners by 2 coordinates.
+    rows = np.stack([warp * by_warp, weft * by_weft, warp * by_weft + weft * by_warp])
+    stiff = (
+        np.array([fabric.stiffness_warp, fabric.stiffness_weft, shear])[:, None, None, None]
+        * area[:, None, None]
+        * rows
+    )
+    count, columns = 2 * len(cloth.flat), 2 * corner_flat[:, :, None] + np.arange(2)
     matrix, mending = hold_seams(cloth.flat, seams, difference, _SEAM * threads)
+    matrix = matrix + cell_matrix(np.einsum("scia,scjb->ciajb", stiff, rows), columns, columns, (count, count))
     right = np.zeros(count)
-    for values, target, stiffness in zip(
-        rows, wanted.T, (fabric.stiffness_warp, fabric.stiffness_weft, shear), strict=True
-    ):
-        places = (np.repeat(np.arange(cells), 6), columns.ravel())
-        b = coo_array((values.reshape(-1), places), shape=(cells, count)).tocsr()
-        weighted = diags_array(stiffness * area) @ b
-        matrix = matrix + b.T @ weighted
-        right += weighted.T @ target
+    np.add.at(right, columns, np.einsum("scia,cs->cia", stiff, wanted))
     solve = factor_symmetric(csc_array(matrix + diags_array(np.full(count, _HOLD * threads))))
     return solve(mending).reshape(-1, 2), solve(right).reshape(-1, 2)
 

@@ -23,7 +23,7 @@ from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.layers import APART, Layers
 from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.sewn_cloth import SewnCloth
-from warpflat.kernels.drape import Bending, Contact, Motion, evaluate_cloth, evaluate_curvature, gather_drape
+from warpflat.kernels.drape import Bending, Contact, Motion, evaluate_cloth, evaluate_curvature, gather_drape, mat32d
 from warpflat.kernels.drape_contact import anchor_friction, carry_contact, find_planes, load_contact
 from warpflat.kernels.drape_layers import press_layers
 from warpflat.kernels.drape_stiffness import stiffen_cloth, stiffen_contact
@@ -98,7 +98,7 @@ class DrapeEnergy:
         self._cells = [
             x,
             self._on(corner, wp.vec3i),
-            self._on(gradient[:, 1:].reshape(-1, 4), wp.vec4d),
+            self._on(gradient, mat32d),
             self._on(area, wp.float64),
             law,
         ]

@@ -127,4 +127,4 @@ def thread_elastics(cloth: SewnCloth, edges: Sequence[str], body: Body) -> tuple
 
 def hip_level(body: Mannequin | None) -> float:
     """Return the height of a mannequin's hip, below which cloth hangs freely [m]; that of no body lies below everything."""
-    return -np.inf if body is None else float(body.vertices[body.layout.lines["hip"], 1].mean())
+    return -np.inf if body is None else float(body.line("hip")[:, 1].mean())

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 import shapely
 import warp as wp
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay
 
-from warpflat.core import FloatArray, InputError, IntArray, nearest, polyline_length, reflected, short_repr, start_warp
+from warpflat.core import FloatArray, InputError, nearest, polyline_length, reflected, short_repr, start_warp
 from warpflat.flat import Fabric, Surface, mirror_plane, triangulate, vertex_normals
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.check_sewn import check_sewn
@@ -20,18 +20,18 @@ from warpflat.garment.draping.drape_garment import held_vertices, hip_level, thr
 from warpflat.garment.draping.lay_around import Laid, lay_around
 from warpflat.garment.draping.lift import Lift, surface_lift, whole_lifts
 from warpflat.garment.draping.limbs import limb_lines, on_arm
-from warpflat.garment.draping.mesh_pieces import FlatMesh, Weld, mesh_pieces, sew_meshes
+from warpflat.garment.draping.mesh_pieces import FlatMesh, MeshedPieces, Weld, mesh_pieces, sew_meshes
 from warpflat.garment.draping.openings import Opening, find_openings
 from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.relax_drape import relax_drape
 from warpflat.garment.draping.result import Drape
 from warpflat.garment.draping.sew_around import sew_around
-from warpflat.garment.draping.sewn_cloth import SewnCloth
+from warpflat.garment.draping.sewn_cloth import SewnCloth, worn_surface
 from warpflat.garment.draping.thin_body import ThinBody, draw_out_limbs
 from warpflat.garment.draping.worn_layer import closures, in_one_layer, right_side_out, turned_down
 from warpflat.garment.mannequin.head import head_of
 from warpflat.garment.mannequin.mannequin import Mannequin
-from warpflat.pattern import MIRRORED, Pattern, Piece, Seam, SeamSide, is_flounce, whole_pieces
+from warpflat.pattern import MIRRORED, Edge, Pattern, Piece, Seam, SeamSide, is_flounce, whole_pieces
 
 __all__ = ["Placement", "drape_pattern", "lay_pieces", "place_drafted"]
 
@@ -123,9 +123,7 @@ def drape_pattern(
             f"pattern {pattern.name!r} has no seams; name them in a file of [[seams]] and give --seams FILE"
         )
     # A garment of an impossible size comes from a file whose units are wrong.
-    sizes = {
-        name: np.ptp(np.concatenate([edge.points for edge in piece.edges]), axis=0) for name, piece in pieces.items()
-    }
+    sizes = {name: np.ptp(piece.outline, axis=0) for name, piece in pieces.items()}
     name = max(sizes, key=lambda each: float(sizes[each].max()))
     wide, high = sizes[name]
     if not _SIZES[0] <= max(wide, high) <= _SIZES[1]:
@@ -133,7 +131,8 @@ def drape_pattern(
             f"piece {name!r}, the largest, is {1e3 * wide:.1f} by {1e3 * high:.1f} mm; it must be between {1e3 * _SIZES[0]:.0f} "
             f"and {1e3 * _SIZES[1]:.0f} mm long: {_UNITS}"
         )
-    meshes, welds = mesh_pieces(pieces, seams, placement.spacing)
+    meshed = mesh_pieces(pieces, seams, placement.spacing)
+    meshes = meshed.meshes
     start_warp()
     where = wp.get_device(device)
     lifts = whole_lifts(pattern.pieces[chosen], placement.lifts)
@@ -143,7 +142,7 @@ def drape_pattern(
     placed = {name: lifts[name](mesh.points) for name, mesh in meshes.items() if name in lifts}
     lifted = len(placed) == len(meshes) or bool(placed and body is not None)
     if lifted:
-        placed = _mirrored_in_place(placed, welds)
+        placed = _mirrored_in_place(placed, meshed.welds)
     elsewhere = _elsewhere(placed, meshes, solid) if lifted and solid is not None else ""
     if not lifted and body is None:
         raise InputError(f'pattern {pattern.name!r} has no designed surface; name a body: --body "EU 38"')
@@ -158,8 +157,8 @@ def drape_pattern(
                 notes.append(f"{elsewhere}: the pieces are placed by their seams")
             lifted, placed = False, {name: lifts[name](mesh.points) for name, mesh in meshes.items()}
     drafted = [name for name in meshes if name not in placed]
-    placed = _continued(placed, pieces, meshes, welds, body)
-    cloth = sew_meshes(pieces, meshes, welds, fabric=fabric, placed=placed, turned=turned)
+    placed = _continued(placed, meshed, body)
+    cloth = sew_meshes(meshed, fabric, placed, turned=turned)
     designed = Body(cloth.designed, cloth.faces, device=where)
     solid = designed if solid is None else solid
     if not lifted or drafted:
@@ -218,20 +217,23 @@ def place_drafted(
         title = next((each.name for each in given if each.name in titles), "")
         outlines = [line for line_name, line in piece.internal_lines.items() if line_name.startswith("pocket")]
         for ring in shapely.get_parts(shapely.line_merge(shapely.MultiLineString(outlines))) if title else ():
-            points, triangles = _filled(np.asarray(ring.coords))
-            at = whole[name](points)
-            at = at + _ON_TOP * vertex_normals(at, triangles)
-            found.setdefault(title, []).append(_surface(f"{title} {len(found.get(title, ())) + 1}", at, triangles))
+            corners = shapely.Polygon(ring).exterior.coords
+            sides = [Edge(name=str(k), points=np.array(side)) for k, side in enumerate(pairwise(corners))]
+            patch = mesh_pieces({title: Piece(name=title, edges=sides)}, [], _COARSE).meshes[title]
+            at = whole[name](patch.points)
+            at = at + _ON_TOP * vertex_normals(at, patch.triangles)
+            copies = found.setdefault(title, [])
+            copies.append(worn_surface(f"{title} {len(copies) + 1}", at, patch.triangles))
     drafted = [name for name in pieces if name not in whole]
     if not drafted:
         return found
-    meshes, welds = mesh_pieces(pieces, seams, _COARSE)
+    meshed = mesh_pieces(pieces, seams, _COARSE)
+    meshes = meshed.meshes
     start_warp()
     hooded = any(piece.role == "hood" for piece in pieces.values())
     solid = _worn_body(body, head=hooded, device=wp.get_device("cpu"))
-    placed = _mirrored_in_place(
-        {name: whole[name](mesh.points) for name, mesh in meshes.items() if name in whole}, welds
-    )
+    placed = {name: whole[name](mesh.points) for name, mesh in meshes.items() if name in whole}
+    placed = _mirrored_in_place(placed, meshed.welds)
     falling = {name: _FLOUNCE_FLARES for name in drafted if is_flounce(pieces[name])}
     falling |= {
         side.piece: _GATHERS_FLARE
@@ -240,38 +242,19 @@ def place_drafted(
         for side in long
         if side.piece in drafted and _length(pieces, short) < _FULL * _length(pieces, long)
     }
-    placed |= hang_from_edges(placed, meshes, welds, falling)
-    placed = _continued(placed, pieces, meshes, welds, body)
-    cloth = sew_meshes(pieces, meshes, welds, fabric=fabric, placed=placed, turned=turned)
+    placed |= hang_from_edges(placed, meshed, falling)
+    placed = _continued(placed, meshed, body)
+    cloth = sew_meshes(meshed, fabric, placed, turned=turned)
     cloth = _sewn_to(cloth, {*meshes} - {*drafted} | {*falling}, _dressed(solid, meshes, placed, whole))
     for name in drafted:
         title = next(each.name for each in given if name == each.name or name.startswith(each.name + " "))
         points = cloth.designed[cloth.welded[cloth.piece_vertices[name]]]
-        found.setdefault(title, []).append(_surface(name, points, meshes[name].triangles))
+        found.setdefault(title, []).append(worn_surface(name, points, meshes[name].triangles))
     return found
 
 
 def _length(pieces: Mapping[str, Piece], row: Sequence[SeamSide]) -> float:
     return sum(pieces[side.piece].edge(side.edge).length for side in row)
-
-
-def _filled(outline: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return a mesh of the inside of a convex outline: points (#P by 2 [m]) and triangles (#T by 3)."""
-    polygon = shapely.Polygon(outline)
-    low, high = polygon.bounds[:2], polygon.bounds[2:]
-    grid = np.stack(np.meshgrid(*(np.arange(a, b, _COARSE) for a, b in zip(low, high, strict=True))), axis=-1).reshape(
-        -1, 2
-    )
-    points = np.concatenate([shapely.get_coordinates(polygon.exterior.segmentize(_COARSE))[:-1], grid])
-    points = points[shapely.intersects_xy(polygon.buffer(1e-6), *points.T)]
-    return points, Delaunay(points).simplices.astype(np.int32)
-
-
-def _surface(name: str, points: FloatArray, triangles: IntArray) -> Surface:
-    return Surface(
-        vertices=points, faces=np.column_stack([triangles, np.full(len(triangles), -1)]).astype(np.int32), name=name,
-        input_vertices=points, input_index=np.arange(len(points), dtype=np.int32),
-    )  # fmt: skip
 
 
 def _dressed(
@@ -322,21 +305,19 @@ def _sew(
     """
     spacing = max(placement.spacing, _COARSE)
     try:
-        meshes, welds = mesh_pieces(pieces, seams, spacing)
+        meshed = mesh_pieces(pieces, seams, spacing)
     except InputError:
-        meshes, welds = mesh_pieces(pieces, seams, placement.spacing)
-    cloth = sew_meshes(pieces, meshes, welds, fabric=fabric, turned=turned)
+        meshed = mesh_pieces(pieces, seams, placement.spacing)
+    cloth = sew_meshes(meshed, fabric, turned=turned)
     buttons, lines = closures(pieces), limb_lines(body)
-    openings = find_openings(cloth, welds[-1] if buttons else ())
-    girth, around = (
-        polyline_length(body.line("waist"), closed=True),
-        max((each.length for each in openings), default=np.inf),
-    )
+    openings = find_openings(cloth, meshed.welds[-1] if buttons else ())
+    girth = polyline_length(body.line("waist"), closed=True)
+    around = max((each.length for each in openings), default=np.inf)
     if around < _LEAST_GIRTH * girth:
         raise InputError(
             f"the pattern goes {1e3 * around:.0f} mm around the body, whose waist has {1e3 * girth:.0f} mm: {_UNITS} Is a piece missing?"
         )
-    laid = lay_pieces(cloth, pieces, meshes, openings, body, top=placement.top)
+    laid = lay_pieces(cloth, meshed, openings, body, top=placement.top)
     start, limbs = laid.positions, laid.limbs
     is_hooded = laid.hooded or any(piece.role == "hood" for piece in pieces.values())
     solid = _worn_body(body, head=is_hooded, device=device)
@@ -350,26 +331,20 @@ def _sew(
     check_sewn(cloth, sewn, openings, limbs, lines, buttoned=bool(buttons))
     lifts = {
         name: surface_lift(sewn[cloth.welded[cloth.piece_vertices[name]]], mesh.points, mesh.triangles)
-        for name, mesh in meshes.items()
+        for name, mesh in meshed.meshes.items()
     }
     return solid, lifts
 
 
-def _continued(
-    placed: Mapping[str, FloatArray],
-    pieces: Mapping[str, Piece],
-    meshes: Mapping[str, FlatMesh],
-    welds: Sequence[Sequence[Weld]],
-    body: Mannequin | None,
-) -> dict[str, FloatArray]:
+def _continued(placed: Mapping[str, FloatArray], meshed: MeshedPieces, body: Mannequin | None) -> dict[str, FloatArray]:
     """Return the places of all pieces: a hood is worn up, beside a head; what else does not lie goes on from what it is sewn to."""
-    hood = {name for name, piece in pieces.items() if piece.role == "hood"}
+    hood = {name for name, piece in meshed.pieces.items() if piece.role == "hood"}
     head = head_of(body) if body is not None and hood else None
     found = dict(placed)
     if head is not None:
-        halves = hood_beside_head(placed, meshes, welds, hood, float(np.abs(head[0][:, 0]).max()) + _BESIDE_HEAD)
+        halves = hood_beside_head(placed, meshed, hood, float(np.abs(head[0][:, 0]).max()) + _BESIDE_HEAD)
         found = {name: points for name, points in placed.items() if name not in hood} | halves
-    return continue_pieces(found, meshes, welds, turned_down(pieces))
+    return continue_pieces(found, meshed, turned_down(meshed.pieces))
 
 
 def _mirrored_in_place(placed: Mapping[str, FloatArray], welds: Sequence[Sequence[Weld]]) -> dict[str, FloatArray]:
@@ -417,8 +392,7 @@ def _elsewhere(placed: Mapping[str, FloatArray], meshes: Mapping[str, FlatMesh],
 
 def lay_pieces(
     cloth: SewnCloth,
-    pieces: Mapping[str, Piece],
-    meshes: Mapping[str, FlatMesh],
+    meshed: MeshedPieces,
     openings: Sequence[Opening],
     body: Mannequin,
     *,
@@ -431,6 +405,7 @@ def lay_pieces(
     Raises:
         InputError: as there, or the level `top` is unknown.
     """
+    pieces, meshes, _ = meshed
     heights = {name: level.height for name, level in body.levels().items()}
     if isinstance(top, str) and top not in heights:
         raise InputError(f"top: level {top!r} is unknown: {nearest(top, heights)}")

@@ -13,6 +13,7 @@ from warpflat.core import latest_file
 from warpflat.garment.draping.result import Drape
 from warpflat.pattern import (
     ENERGY,
+    LEAST_GAP,
     SKIN,
     Scale,
     begin_stage,
@@ -33,8 +34,6 @@ __all__ = ["choose_frames", "gap_scale", "write_drape_frames"]
 _COUNT = 30
 # Room between the worn garment and the surfaces beside it [m].
 _BESIDE = 0.3
-# The least upper end of the scale of gaps [m].
-_LEAST_GAP = 0.005
 # Way from one frame to the next below which nothing is seen to move [m].
 _SEEN = 1e-4
 
@@ -59,7 +58,7 @@ def choose_frames(frames: Sequence[NDArray[np.float32]], count: int = _COUNT) ->
 
 def gap_scale(drape: Drape) -> Scale:
     """Return the colours of the gap to the body over all frames [m]."""
-    return Scale.from_zero(drape.gap, drape.areas, _LEAST_GAP, ENERGY)
+    return Scale.from_zero(drape.gap, drape.areas, 1e-3 * LEAST_GAP, ENERGY)
 
 
 def write_drape_frames(path: Path, drape: Drape) -> None:
@@ -97,9 +96,7 @@ def write_drape_frames(path: Path, drape: Drape) -> None:
             UsdGeom.Xformable(group).AddTranslateOp().Set(Gf.Vec3d(-width - _BESIDE, 0.0, 0.0))
         tag = group.CreateAttribute("warpflat:stage", Sdf.ValueTypeNames.String, custom=True)
         tag.Set("drape", begin)
-        body = define_mesh(stage, "/World/drape/body", drape.body.triangles)
-        set_points(body, drape.body.vertices)
-        body.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set([Gf.Vec3f(*linear_rgb(SKIN).tolist())])
+        define_mesh(stage, "/World/drape/body", drape.body.triangles, drape.body.vertices, linear_rgb(SKIN).tolist())
         cloth = define_mesh(stage, "/World/drape/cloth", drape.cloth.faces)
         colours = cloth.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
         scale = gap_scale(drape)

@@ -14,10 +14,10 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from warpflat.core import BoolArray, FloatArray, InputError, IntArray, factor_symmetric, polyline_length
+from warpflat.core import BoolArray, FloatArray, InputError, IntArray, factor_symmetric, polyline_length, unit
 from warpflat.flat import border_edges
 from warpflat.garment.draping.openings import Opening
 from warpflat.garment.draping.sew_around import AsRigid
@@ -109,7 +109,7 @@ def lay_around(
     Raises:
         InputError: the openings are not those of a garment.
     """
-    graph, rigid = _edges(cloth), AsRigid(cloth)
+    graph, rigid = cloth.edge_lengths(), AsRigid(cloth)
     sides = set(map(tuple, border_edges(cloth.faces).tolist()))
     pairs = [
         pair for each in openings for pair in np.column_stack([each.vertices, np.roll(each.vertices, -1)]).tolist()
@@ -172,15 +172,6 @@ def lay_around(
     for hung, ring in tops:
         laid[hung, 1] += ring.centre[1] - laid[ring.vertices, 1].mean()
     return Laid(positions=laid, limbs=limbs, hooded=hooded, level=level)
-
-
-def _edges(cloth: SewnCloth) -> csr_array:
-    """Return the lengths of the edges in the flat cloth [m], #V by #V."""
-    faces = cloth.flat_faces[:, :3]
-    pair = np.concatenate([faces[:, [k, (k + 1) % 3]] for k in range(3)])
-    length = np.linalg.norm(cloth.flat[pair[:, 0]] - cloth.flat[pair[:, 1]], axis=1)
-    joined, first = np.unique(np.sort(cloth.welded[pair], axis=1), axis=0, return_index=True)
-    return coo_array((length[first], tuple(joined.T)), shape=(len(cloth.designed),) * 2).tocsr()
 
 
 def _kinds(openings: Sequence[Opening], far: FloatArray, up: FloatArray, waist: float) -> list[str]:
@@ -300,7 +291,7 @@ def _rings(
             # From the edge of the neck along the shoulder.
             reach += openings[highest].length / (2.0 * np.pi) if not hooded else 0.0
             beyond = max(0.0, reach - float(np.linalg.norm(line[1] - line[0])))
-            out = (line[2] - line[1]) / np.linalg.norm(line[2] - line[1])
+            out = unit(line[2] - line[1])
             centre = line[1] + beyond * out
             value, looks = (
                 far[named.index("hem") if "hem" in named else named.index(name.replace("arm", "leg"))] - far[highest],
@@ -320,13 +311,10 @@ def _rings(
             centre = middle * [1.0, 0.0, 1.0] + (high - (0.0 if name == "waist" else reach)) * _UP
         else:
             continue
-        u = np.cross(out, ahead if abs(out[2]) < 0.9 else _UP)
-        u /= np.linalg.norm(u)
+        u = unit(np.cross(out, ahead if abs(out[2]) < 0.9 else _UP))
         # With the cloth on its left a border runs clockwise about the way out of it.
         axes = radius * np.array([u, -handed * np.cross(out, u)])
-        step = np.asarray(
-            graph[each.vertices, np.roll(each.vertices, -1)] + graph[np.roll(each.vertices, -1), each.vertices]
-        )
+        step = np.asarray(graph[each.vertices, np.roll(each.vertices, -1)])
         circle = np.exp(2j * np.pi * (np.cumsum(step) - step) / step.sum())
         ring = _Ring(vertices=each.vertices, circle=circle, centre=centre, axes=axes)
         if aside is None and rings:

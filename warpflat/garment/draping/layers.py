@@ -12,7 +12,8 @@ import warp as wp
 from scipy.sparse import coo_array, csr_array
 
 from warpflat.core import FloatArray, launch_each
-from warpflat.flat import triangulate, vertex_normals
+from warpflat.flat import face_normals, triangulate, vertex_normals
+from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.sewn_cloth import SewnCloth
 from warpflat.kernels.drape_layers import find_layers
 
@@ -39,18 +40,14 @@ class Layers:
 
     def __init__(self, cloth: SewnCloth, device: wp.Device) -> None:
         """Build the search tree of a cloth; no layer is near before `renew`."""
-        self._device, count = device, len(cloth.designed)
-        self._triangles, face = triangulate(cloth.faces)
+        self._surface, count = Body(cloth.designed, cloth.faces, device=device), len(cloth.designed)
         near = cloth.laplacian()[0]
         self._near = [wp.array(each, dtype=wp.int32, device=device) for each in (near.indptr, near.indices)]
         piece = np.zeros(len(cloth.faces))
         for number, rows in enumerate(cloth.piece_faces.values()):
             piece[rows] = _BETWEEN_PIECES * number
-        self._flat = np.column_stack([cloth.flat[triangulate(cloth.flat_faces)[0]].mean(axis=1), piece[face]])
-        self._mesh = wp.Mesh(
-            points=wp.array(cloth.designed, dtype=wp.vec3, device=device),
-            indices=wp.array(self._triangles.ravel(), dtype=wp.int32, device=device),
-        )
+        triangles, face = triangulate(cloth.flat_faces)
+        self._flat = np.column_stack([cloth.flat[triangles].mean(axis=1), piece[face]])
         self._vertex = np.repeat(np.arange(count), 2)
         self.corner = np.repeat(self._vertex, 3).reshape(-1, 3)
         self._share, self._normal, self._skin = (
@@ -68,18 +65,16 @@ class Layers:
         count = len(positions)
         if np.abs(positions - self._at).max() < _HOLDS:
             return False
-        self._mesh.points.assign(positions.astype(np.float32))
-        self._mesh.refit()
-        outwards = vertex_normals(positions, self._triangles)
-        given = [wp.array(rows, dtype=wp.vec3d, device=self._device) for rows in (positions, outwards)]
-        found, share = wp.zeros(2 * count, wp.int32, self._device), wp.zeros(2 * count, wp.vec3d, self._device)
-        inputs = [wp.uint64(self._mesh.id), *self._near, *given, _REACH]
-        launch_each(find_layers, count, inputs, [found, share], device=self._device, least=64)
+        surface, device = self._surface, self._surface.device
+        surface.move(positions)
+        outwards = vertex_normals(positions, surface.triangles)
+        given = [wp.array(rows, dtype=wp.vec3d, device=device) for rows in (positions, outwards)]
+        found, share = wp.zeros(2 * count, wp.int32, device), wp.zeros(2 * count, wp.vec3d, device)
+        inputs = [wp.uint64(surface.mesh.id), *self._near, *given, _REACH]
+        launch_each(find_layers, count, inputs, [found, share], device=device, least=64)
         face, self._share = found.numpy().copy(), share.numpy().copy()
-        self.corner = np.where(face[:, None] < 0, self._vertex[:, None], self._triangles[face])
-        a, b, c = positions[self.corner].transpose(1, 0, 2)
-        normal = np.cross(b - a, c - a)
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+        self.corner = np.where(face[:, None] < 0, self._vertex[:, None], surface.triangles[face])
+        normal = face_normals(positions, surface.triangles)[face]
         height = np.einsum("ki,ki->k", self._off(positions), normal)
         side = np.where(height < 0.0, -1.0, 1.0)
         # What lay before a vertex may now lie behind it.

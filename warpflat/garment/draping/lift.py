@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from warpflat.core import FARTHEST, FloatArray, InputError, IntArray, reading
+from warpflat.core import FARTHEST, FloatArray, InputError, IntArray, reading, reflected, turned_left, unit
 from warpflat.pattern import MIRRORED, Piece
 
 __all__ = ["Lift", "moved_lift", "read_lift", "surface_lift", "whole_lifts"]
@@ -102,14 +102,12 @@ def _turned(lift: Lift) -> Lift:
 
 def _unfolded(piece: Piece, lift: Lift) -> Lift:
     start, end = next(edge for edge in piece.edges if edge.kind == "fold").points[[0, -1]]
-    along = (end - start) / np.linalg.norm(end - start)
+    # The outline runs counter-clockwise: the half lies on the left of its fold.
+    inwards = turned_left(unit(end - start)[None])[0]
 
     def unfolded(points: FloatArray) -> FloatArray:
-        off = points - start
-        # The outline runs counter-clockwise: the half lies on the left of its fold.
-        beyond = along[0] * off[:, 1] - along[1] * off[:, 0] < 0.0
-        image = start + 2.0 * np.outer(off @ along, along) - off
-        found = lift(np.where(beyond[:, None], image, points))
+        beyond = (points - start) @ inwards < 0.0
+        found = lift(np.where(beyond[:, None], reflected(points, inwards, start @ inwards), points))
         found[beyond, 0] *= -1.0
         return found
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from warpflat.core import BoolArray, FloatArray
+from warpflat.core import BoolArray, FloatArray, unit
 from warpflat.garment.mannequin.mannequin import Mannequin
 
 __all__ = ["limb_lines", "links", "on_arm"]
@@ -22,13 +22,12 @@ def limb_lines(body: Mannequin) -> dict[str, FloatArray]:
     That of the head leaves through the face, as it does in a hood.
     """
     chest, neck = body.line("bust").mean(axis=0), body.line("collar").mean(axis=0)
-    ways, face = dict[str, tuple[str, str]](), neck + np.array([0.0, _FACE, 0.0])
-    for side in ("left", "right"):
-        ways |= {f"{side} arm": (f"armhole {side}", f"wrist {side}"), f"{side} leg": (f"thigh {side}", f"ankle {side}")}
+    face = neck + np.array([0.0, _FACE, 0.0])
     found = {"head": np.array([chest, neck, face, face + np.array([0.0, 0.0, _BEYOND])])}
-    for limb, ends in ways.items():
-        near, end = (body.line(line).mean(axis=0) for line in ends)
-        found[limb] = np.array([chest, near, end, end + _BEYOND * (end - near) / np.linalg.norm(end - near)])
+    for limb, ends in {"arm": ("armhole", "wrist"), "leg": ("thigh", "ankle")}.items():
+        for side in ("left", "right"):
+            near, end = (body.line(f"{line} {side}").mean(axis=0) for line in ends)
+            found[f"{side} {limb}"] = np.array([chest, near, end, end + _BEYOND * unit(end - near)])
     return found
 
 
@@ -64,7 +63,7 @@ def on_arm(points: FloatArray, lines: Mapping[str, FloatArray]) -> BoolArray:
     found = np.zeros(len(points), dtype=bool)
     for limb in ("left arm", "right arm"):
         _, armhole, wrist, _ = lines[limb]
-        way = (wrist - armhole) / np.linalg.norm(wrist - armhole)
+        way = unit(wrist - armhole)
         along = (points - armhole) @ way
         found |= (along > 0.0) & (np.linalg.norm(points - armhole - along[:, None] * way, axis=1) < _ARM)
     return found

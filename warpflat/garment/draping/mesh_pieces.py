@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
-from warpflat.core import FloatArray, InputError, IntArray, points_at_lengths, polyline_length
+from warpflat.core import FloatArray, InputError, IntArray, points_at_lengths, polyline_length, unit
 from warpflat.flat import Fabric
 from warpflat.garment.draping.sewn_cloth import ClothPiece, SewnCloth, join_pieces, piece_slices
 from warpflat.garment.draping.worn_layer import closures
 from warpflat.pattern import Edge, Piece, Seam, eased_length, hole_edges
 
-__all__ = ["FlatMesh", "Weld", "mesh_pieces", "sew_meshes"]
+__all__ = ["FlatMesh", "MeshedPieces", "Weld", "mesh_pieces", "sew_meshes"]
 
 # Ends of edges on both sides of a seam that are closer than this share of the spacing are sewn to each other.
 _SNAP = 0.35
@@ -45,9 +46,15 @@ class FlatMesh:
 Weld = list[tuple[str, int]]
 
 
-def mesh_pieces(
-    pieces: Mapping[str, Piece], seams: Sequence[Seam], spacing: float
-) -> tuple[dict[str, FlatMesh], list[list[Weld]]]:
+class MeshedPieces(NamedTuple):
+    """Pieces and their meshes by name, and for each seam the vertices that it joins, from its start on; buttons are one more at the end."""
+
+    pieces: Mapping[str, Piece]
+    meshes: Mapping[str, FlatMesh]
+    welds: Sequence[Sequence[Weld]]
+
+
+def mesh_pieces(pieces: Mapping[str, Piece], seams: Sequence[Seam], spacing: float) -> MeshedPieces:
     """Mesh pieces so that the vertices of their seams meet, and those where buttons and ties close them.
 
     Each seam is divided once, at the ends of the edges on both its sides and in between, and both sides get these points.
@@ -57,9 +64,6 @@ def mesh_pieces(
         pieces: whole ones.
         seams: between them; each edge in one at most.
         spacing: wished edge [m].
-
-    Returns:
-        The meshes by piece, and for each seam the vertices that it joins, from its start to its end; the buttons come last, as one more.
 
     Raises:
         InputError: an edge is in two seams, or a piece is too narrow for the spacing.
@@ -73,7 +77,7 @@ def mesh_pieces(
     }
     owner: dict[tuple[str, str], int] = {}
     for number, seam in enumerate(seams):
-        for side in (side for chain in seam.sides for side in chain):
+        for side in seam.stretches:
             key = side.piece, side.edge
             if key in owner:
                 raise InputError(f"edge {side} is sewn twice, in {seams[owner[key]].name!r} and {seam.name!r}")
@@ -96,7 +100,7 @@ def mesh_pieces(
         if not missing:
             welds = [[[(p, int(meshes[p].edges[e][k])) for p, e, k in joint] for joint in row] for row in joints]
             closed = [[(p, int(cKDTree(meshes[p].points).query(at)[1])) for p, at in layers] for layers in buttons]
-            return meshes, [*welds, closed] if closed else welds
+            return MeshedPieces(pieces, meshes, [*welds, closed] if closed else welds)
         for group in missing:
             finer[group] = 2 * finer.get(group, 1)
     narrow = next(iter(missing))
@@ -107,23 +111,21 @@ def mesh_pieces(
 
 
 def sew_meshes(
-    pieces: Mapping[str, Piece],
-    meshes: Mapping[str, FlatMesh],
-    welds: Sequence[Sequence[Weld]],
-    *,
+    meshed: MeshedPieces,
     fabric: Fabric,
     placed: Mapping[str, FloatArray] | None = None,
+    *,
     turned: frozenset[str] = frozenset(),
 ) -> SewnCloth:
     """Join meshes along their seams.
 
     Args:
-        pieces: that were meshed.
-        meshes, welds: of them, as of `mesh_pieces`.
+        meshed: the pieces.
         fabric: of all pieces.
         placed: by piece where its vertices are designed to lie (#P by 3 [m]); nowhere if not given.
         turned: the pieces that were turned over.
     """
+    pieces, meshes, welds = meshed
     begins = {name: rows.start for name, rows in piece_slices({n: m.points for n, m in meshes.items()}).items()}
     pairs = [(begins[a] + i, begins[b] + j) for seam in welds for (a, i), *others in seam for b, j in others]
     cloth = {}
@@ -132,7 +134,7 @@ def sew_meshes(
         along = np.array([0.0, 1.0]) if grain is None else grain[1] - grain[0]
         space = np.zeros((len(mesh.points), 3)) if placed is None else placed[name]
         faces = np.pad(mesh.triangles, ((0, 0), (0, 1)), constant_values=-1)
-        cloth[name] = ClothPiece(mesh.points, faces, space, along / np.linalg.norm(along), {**mesh.lines, **mesh.edges})
+        cloth[name] = ClothPiece(mesh.points, faces, space, unit(along), {**mesh.lines, **mesh.edges})
     return join_pieces(cloth, *np.array(pairs, dtype=np.int64).reshape(-1, 2).T, fabric=fabric, turned=turned)
 
 

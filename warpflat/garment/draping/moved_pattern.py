@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from warpflat.core import FloatArray, IntArray
+from warpflat.core import FloatArray, IntArray, reflected, turned_left, unit
 from warpflat.flat import Flattening, corner_triangles
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.draping.lift import Lift, surface_lift
@@ -15,6 +15,7 @@ from warpflat.garment.draping.sewn_cloth import SewnCloth, pieces_of
 from warpflat.pattern import MIRRORED, Pattern, Piece, outline_edges
 
 __all__ = [
+    "cell_matrix",
     "edge_lengths",
     "hold_seams",
     "largest_share",
@@ -62,18 +63,18 @@ def hold_seams(
         weight: of the square of each difference.
     """
     # The change of the difference by the displacement of the vertices, #S by 2 #P.
-    rows, columns, values = [], [], []
-    for side, sign in ((0, 1.0), (1, -1.0)):
-        ends = seams[:, side]
-        along = flat[ends[:, 1]] - flat[ends[:, 0]]
-        unit = sign * along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-30)
-        for end, of_end in ((0, -unit), (1, unit)):
-            rows.append(np.repeat(np.arange(len(seams)), 2))
-            columns.append((2 * ends[:, end, None] + np.arange(2)).ravel())
-            values.append(of_end.ravel())
-    places, shape = (np.concatenate(rows), np.concatenate(columns)), (len(seams), 2 * len(flat))
-    change = coo_array((np.concatenate(values), places), shape=shape).tocsr()
+    along = unit(flat[seams[:, :, 1]] - flat[seams[:, :, 0]]) * [[1.0], [-1.0]]
+    values, columns = np.stack([-along, along], axis=2), 2 * seams[..., None] + np.arange(2)
+    places = (np.repeat(np.arange(len(seams)), 8), columns.ravel())
+    change = coo_array((values.ravel(), places), shape=(len(seams), 2 * len(flat))).tocsr()
     return weight * (change.T @ change), weight * (change.T @ (difference - seam_differences(flat, seams)))
+
+
+def cell_matrix(blocks: FloatArray, rows: IntArray, columns: IntArray, shape: tuple[int, int]) -> csr_array:
+    """Return the sum of cells' blocks, #C by corners and coordinates of a row by those of a column, as a matrix."""
+    of_rows = np.broadcast_to(rows[:, :, :, None, None], blocks.shape)
+    of_columns = np.broadcast_to(columns[:, None, None], blocks.shape)
+    return csr_array(coo_array((blocks.ravel(), (of_rows.ravel(), of_columns.ravel())), shape=shape))
 
 
 def largest_share(cloth: SewnCloth, step: FloatArray) -> float:
@@ -111,16 +112,15 @@ def moved_outlines(pattern: Pattern, size: str, before: SewnCloth, after: SewnCl
         if piece.name not in before.piece_vertices:
             return piece
         own, fold = mover(piece.name), next((edge.points for edge in piece.edges if edge.kind == "fold"), None)
-        other, mirror, origin = own, np.eye(2), np.zeros(2)
+        other, normal, offset = own, np.zeros(2), 0.0
         if fold is not None:
-            along = (fold[-1] - fold[0]) / np.linalg.norm(fold[-1] - fold[0])
-            mirror, origin = 2.0 * np.outer(along, along) - np.eye(2), fold[0]
+            normal = turned_left(unit(fold[[-1]] - fold[[0]]))[0]
+            offset = float(fold[0] @ normal)
         elif piece.name + MIRRORED in before.piece_vertices:
-            other, mirror = mover(piece.name + MIRRORED), np.diag([-1.0, 1.0])
+            other, normal = mover(piece.name + MIRRORED), np.array([1.0, 0.0])
 
         def go(points: FloatArray) -> FloatArray:
-            image = (points - origin) @ mirror + origin
-            return np.asarray(points + 0.5 * (own(points) + other(image) @ mirror))
+            return points + 0.5 * (own(points) + reflected(other(reflected(points, normal, offset)), normal))
 
         return replace(
             piece, edges=[replace(edge, points=go(edge.points), vertices=None) for edge in piece.edges],

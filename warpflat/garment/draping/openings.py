@@ -45,23 +45,16 @@ def find_openings(cloth: SewnCloth, buttons: Sequence[Weld] = ()) -> list[Openin
         loops = border_loops(orient(cloth.faces)[0])
     except InputError:
         return []
-    names = [name for name, rows in cloth.piece_faces.items() for _ in range(rows.start, rows.stop)]
-    lengths: dict[tuple[int, int], tuple[float, str]] = {}
-    angle = np.zeros(len(cloth.designed))
+    lengths, angle = cloth.edge_lengths(), np.zeros(len(cloth.designed))
     for k in range(3):
-        vertex, ahead, behind = (cloth.flat_faces[:, (k + step) % 3] for step in range(3))
-        corner, *others = (cloth.flat[each] @ [1.0, 1j] for each in (vertex, ahead, behind))
-        np.add.at(angle, cloth.welded[vertex], np.angle((others[1] - corner) / (others[0] - corner)))
-        pairs = np.sort(cloth.welded[np.column_stack([vertex, ahead])], axis=1).tolist()
-        along = np.abs(others[0] - corner).tolist()
-        lengths |= {(a, b): (length, name) for (a, b), length, name in zip(pairs, along, names, strict=True)}
+        corner, *others = (cloth.flat[cloth.flat_faces[:, (k + step) % 3]] @ [1.0, 1j] for step in range(3))
+        np.add.at(angle, cloth.faces[:, k], np.angle((others[1] - corner) / (others[0] - corner)))
     found = []
     for loop in [part for whole in loops for part in _between_buttons(whole, cloth, buttons)]:
-        sides = np.sort(np.column_stack([loop, np.roll(loop, -1)]), axis=1).tolist()
-        on = [lengths[a, b] for a, b in sides if (a, b) in lengths]
-        pieces = frozenset(name for _, name in on)
-        turn = float((np.pi - angle[loop]).sum())
-        found.append(Opening(vertices=loop, length=sum(length for length, _ in on), pieces=pieces, turn=turn))
+        length, turn = float(lengths[loop, np.roll(loop, -1)].sum()), float((np.pi - angle[loop]).sum())
+        on = {name: np.isin(loop, cloth.welded[rows]) for name, rows in cloth.piece_vertices.items()}
+        pieces = frozenset(name for name, ends in on.items() if (ends & np.roll(ends, -1)).any())
+        found.append(Opening(vertices=loop, length=length, pieces=pieces, turn=turn))
     # Of two that are equally long, as armholes, the first is that of the first vertex, however their lengths are rounded.
     return sorted(found, key=lambda each: (-round(each.length, 6), int(each.vertices.min())))
 

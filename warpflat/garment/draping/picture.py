@@ -16,6 +16,7 @@ from warpflat.core import FloatArray
 from warpflat.garment.draping.frames import choose_frames, gap_scale
 from warpflat.garment.draping.result import Drape
 from warpflat.pattern import (
+    LEAST_GAP,
     PAGE_WIDTH,
     PIXELS_AROUND,
     SIDES,
@@ -98,7 +99,7 @@ def write_drape_film(path: str | os.PathLike[str], drape: Drape) -> None:
             shot = Shot(view, per_metre, low=room.min(axis=0), size=np.ptp(room, axis=0))
             sides.append(on_paper(shot.pixels(colours)))
         pictures.append(Image.fromarray(np.concatenate(sides, axis=1)))
-    write_moving_picture(path, pictures, [1000 // _RATE] * (len(pictures) - 1) + [2000])
+    write_moving_picture(path, pictures, each=1000 // _RATE, last=2000)
 
 
 _PRESSURE = "pressure [kPa]"
@@ -119,7 +120,7 @@ def _maps(drapes: list[Drape]) -> dict[str, tuple[list[FloatArray], Scale]]:
     pressures = [1e-3 * corner_mean(drape.pressure, drape.cloth.faces) for drape in drapes]
     most, most_sheared = 100.0 * max(f.strain_limit for f in limits), max(f.shear_limit for f in limits)
     return {
-        "gap to the body [mm]": (gaps, Scale.from_zero(np.concatenate(gaps), areas, 5.0)),
+        "gap to the body [mm]": (gaps, Scale.from_zero(np.concatenate(gaps), areas, LEAST_GAP)),
         "strain of the more strained thread [%]": (
             strains,
             Scale.both_ways(np.concatenate(strains), areas, 0.5, most),

@@ -18,14 +18,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import block_array, coo_array, csc_array, csr_array, diags_array
+from scipy.sparse import block_array, csc_array, diags_array
 
-from warpflat.core import BoolArray, FloatArray, InputError, IntArray, factor_symmetric, short_repr
+from warpflat.core import BoolArray, FloatArray, InputError, factor_symmetric, short_repr
 from warpflat.flat import Flattening, corner_triangles
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.draping.drape_energy import DrapeEnergy
 from warpflat.garment.draping.drape_garment import held_vertices
 from warpflat.garment.draping.moved_pattern import (
+    cell_matrix,
     edge_lengths,
     hold_seams,
     largest_share,
@@ -122,8 +123,8 @@ def recover_cloth(
             (2 * corner_flat[..., None] + np.arange(2)),
         )
         free = diags_array(np.repeat((~held).astype(np.float64), 3))
-        jacobian = free @ _assembled(by_flat, rows, columns, (space, flat))
-        damping = _DAMPING * _assembled(in_plane, columns, columns, (flat, flat))
+        jacobian = free @ cell_matrix(by_flat, rows, columns, (space, flat))
+        damping = _DAMPING * cell_matrix(in_plane, columns, columns, (flat, flat))
         sides, right = hold_seams(cloth.flat, seams, difference, _SEAM * threads)
         damping = damping + sides + diags_array(np.full(flat, _HOLD * threads))
         matrix = csc_array(block_array([[energy.stiffness(taut), -jacobian], [-jacobian.T, -damping]]))
@@ -135,10 +136,3 @@ def recover_cloth(
         strains.append(float(np.abs(edge_lengths(moved.flat, edges) / edge_lengths(cloth.flat, edges) - 1.0).mean()))
         cloth, converged = moved, strains[-1] < _LEAST_STRAIN
     return Recovery(cloth=cloth, off=off, strains=tuple(strains), converged=converged)
-
-
-def _assembled(blocks: FloatArray, rows: IntArray, columns: IntArray, shape: tuple[int, int]) -> csr_array:
-    """Return the sum of cells' blocks, #C by corners and coordinates of a row by those of a column, as a matrix."""
-    of_rows = np.broadcast_to(rows[:, :, :, None, None], blocks.shape)
-    of_columns = np.broadcast_to(columns[:, None, None], blocks.shape)
-    return csr_array(coo_array((blocks.ravel(), (of_rows.ravel(), of_columns.ravel())), shape=shape))

@@ -10,13 +10,13 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from warpflat.core import FloatArray, InputError, IntArray, range_offsets
-from warpflat.flat import Fabric, Flattening, corner_triangles, grain_axes, join_labels
+from warpflat.flat import Fabric, Flattening, Surface, corner_triangles, grain_axes, join_labels, mesh_edges
 from warpflat.garment.construction.darts import dart_pairs
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.garment import Garment
 from warpflat.pattern import outline_edges
 
-__all__ = ["ClothPiece", "SewnCloth", "join_pieces", "piece_slices", "pieces_of", "sew_cloth"]
+__all__ = ["ClothPiece", "SewnCloth", "join_pieces", "piece_slices", "pieces_of", "sew_cloth", "worn_surface"]
 
 Seam = tuple[tuple[str, str], tuple[IntArray, IntArray]]
 
@@ -71,6 +71,14 @@ class SewnCloth:
         """Return warp and weft in each cell of cloth at #V by 3 places [m], 2 by #C by 3: of length 1 without strain."""
         corner, _, gradient, _ = self.cells()
         return np.einsum("cki,ckw->wci", positions[corner], gradient)
+
+    def edge_lengths(self) -> csr_array:
+        """Return #V by #V, the lengths of the edges in the flat cloth [m], either way; without the diagonals of quads."""
+        edges = mesh_edges(self.flat_faces)
+        length = np.linalg.norm(self.flat[edges[:, 0]] - self.flat[edges[:, 1]], axis=1)
+        joined, first = np.unique(np.sort(self.welded[edges], axis=1), axis=0, return_index=True)
+        half = coo_array((length[first], tuple(joined.T)), shape=(len(self.designed),) * 2).tocsr()
+        return half + half.T
 
     def laplacian(self) -> tuple[csr_array, FloatArray]:
         """Return the flat cloth's Laplacian, across seams too, and the bending stiffness at each vertex.
@@ -158,6 +166,14 @@ def join_pieces(
         },
         turned=turned,
     )
+
+
+def worn_surface(name: str, points: FloatArray, faces: IntArray) -> Surface:
+    """Return a piece at places in space, #P by 3 [m], with its own faces, #F by 4 or 3."""
+    return Surface(
+        vertices=points, faces=np.pad(faces, ((0, 0), (0, 4 - faces.shape[1])), constant_values=-1).astype(np.int32), name=name,
+        input_vertices=points, input_index=np.arange(len(points), dtype=np.int32),
+    )  # fmt: skip
 
 
 def pieces_of(garment: Garment | Flattening | Sequence[Flattening]) -> dict[str, Flattening]:

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.spatial import cKDTree
 
-from warpflat.core import BoolArray, FloatArray, IntArray
+from warpflat.core import BoolArray, FloatArray, IntArray, unit
 from warpflat.flat import border_loops, mesh_edges, vertex_normals
 from warpflat.garment.draping.body import Body
 
@@ -42,7 +42,7 @@ def draw_out_limbs(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, I
         way = middle - vertices[(far > _BESIDE[0]) & (far < _BESIDE[1])].mean(axis=0)
         is_leg = middle[1] < vertices[:, 1].min() + _LOW * np.ptp(vertices[:, 1])
         length, narrows = (_LEG, 0.0) if is_leg else (_ARM, _NARROWS)
-        way = np.array([0.0, -1.0, 0.0]) if is_leg else way / np.linalg.norm(way)
+        way = np.array([0.0, -1.0, 0.0]) if is_leg else unit(way)
         steps = np.arange(1, round(length / _STEP) + 1)[:, None, None]
         rings = middle + (1.0 - narrows * steps) * (vertices[loop] - middle) + _STEP * steps * way
         count = sum(map(len, rows))

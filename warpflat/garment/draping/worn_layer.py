@@ -13,7 +13,7 @@ import numpy as np
 from shapely import Point, Polygon, contains_xy
 from shapely.ops import nearest_points
 
-from warpflat.core import FloatArray, nearest_on_polyline
+from warpflat.core import FloatArray, nearest_on_polyline, segment_lengths, unit
 from warpflat.pattern import MIRRORED, Edge, Piece, Seam, SeamSide, hole_edges, turn_over
 
 __all__ = ["Button", "closures", "in_one_layer", "right_side_out", "turned_down"]
@@ -47,7 +47,7 @@ def in_one_layer(
     seams = list(seams)
     out = {name for name, piece in pieces.items() if piece.role in _WITHIN or _is_binding(piece)} | _bags(pieces, seams)
     # The second layer of a collar, sewn to the first one alone, has no place of its own.
-    pairs = [{side.piece for chain in seam.sides for side in chain} for seam in seams]
+    pairs = [{side.piece for side in seam.stretches} for seam in seams]
     layers = {name for name in pieces if name.endswith(MIRRORED) and name.removesuffix(MIRRORED) not in lifted}
     layers = layers - out if lifted else set()
     while held_by := {
@@ -61,15 +61,15 @@ def in_one_layer(
     seams = [*(seam for seam, pair in zip(seams, pairs, strict=True) if not pair & out), *openings]
     kept, folded = {name: piece for name, piece in pieces.items() if name not in out}, set[str]()
     for name, piece in kept.items():
-        sewn = {side.edge for seam in seams for chain in seam.sides for side in chain if side.piece == name}
+        sewn = {side.edge for seam in seams for side in seam.stretches if side.piece == name}
         for line in [line for title, line in piece.internal_lines.items() if title.startswith(_FOLD)]:
             kept[name] = cut = _cut_at(kept[name], line, sewn)
             folded |= {name} if cut is not piece else set()
     there = {(name, edge.name) for name, piece in kept.items() for edge in piece.edges}
     there |= {(name, edge.name) for name, piece in kept.items() for hole in piece.holes for edge in hole_edges(hole)}
-    seams = [seam for seam in seams if all((side.piece, side.edge) in there for chain in seam.sides for side in chain)]
+    seams = [seam for seam in seams if all(side.place in there for side in seam.stretches)]
     # What hung by what is left out alone is sewn to nothing now.
-    lost = set(kept) - {side.piece for seam in seams for chain in seam.sides for side in chain}
+    lost = set(kept) - {side.piece for seam in seams for side in seam.stretches}
     kept = {name: piece for name, piece in kept.items() if name not in lost}
     titles = sorted({name.removesuffix(MIRRORED) for name in out | folded | lost})
     return kept, seams, [f"worn in one layer: {', '.join(titles)}"] if titles else []
@@ -95,7 +95,7 @@ def _cut_off_corners(
     to the opening.
     """
     cut, closed = dict(pieces), list[Seam]()
-    beside = {(side.piece, side.edge) for seam in seams for chain in seam.sides if len(chain) > 1 for side in chain}
+    beside = {side.place for seam in seams for chain in seam.sides if len(chain) > 1 for side in chain}
     # Both sides of a seam, either first.
     pairs = [
         (seam.name, one[0], other[0])
@@ -134,7 +134,7 @@ def _cut_off_corners(
 
 def _cut_at(piece: Piece, line: FloatArray, sewn: Collection[str]) -> Piece:
     """Return the part of a piece on that side of a straight line on which more of its outline is sewn."""
-    along = (line[-1] - line[0]) / np.linalg.norm(line[-1] - line[0])
+    along = unit(line[-1] - line[0])
     across = np.array([-along[1], along[0]])
 
     def off(points: FloatArray) -> FloatArray:
@@ -146,7 +146,7 @@ def _cut_at(piece: Piece, line: FloatArray, sewn: Collection[str]) -> Piece:
     for edge in piece.edges:
         if edge.name in sewn:
             middle = 0.5 * (edge.points[1:] + edge.points[:-1])
-            length = np.linalg.norm(np.diff(edge.points, axis=0), axis=1)
+            length = segment_lengths(edge.points)
             for k, side in enumerate((1.0, -1.0)):
                 lengths[k] += float(length[side * off(middle) > 0.0].sum())
     side = 1.0 if lengths[0] >= lengths[1] else -1.0

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from warpflat.core import file_in, latest_file, optional_file, output_folder
-from warpflat.flat import Surface
 from warpflat.garment.draping.frames import write_drape_frames
 from warpflat.garment.draping.picture import write_drape_film, write_drape_picture
 from warpflat.garment.draping.result import Drape
+from warpflat.garment.draping.sewn_cloth import worn_surface
 from warpflat.pattern import write_obj, write_sewn_usd
 
 __all__ = ["save_drape", "write_drape_files"]
@@ -51,12 +51,8 @@ def write_drape_files(
     cloth = drape.cloth
     for name, rows in cloth.piece_vertices.items():
         space, faces = drape.positions[cloth.welded[rows]], cloth.flat_faces[cloth.piece_faces[name]]
-        surface = Surface(
-            vertices=space, faces=np.where(faces >= 0, faces - rows.start, -1).astype(np.int32), name=name,
-            input_vertices=space, input_index=np.arange(len(space), dtype=np.int32),
-        )  # fmt: skip
         path = file_in(folder, name, ".draped.obj")
-        write_obj(path, surface, cloth.flat[rows])
+        write_obj(path, worn_surface(name, space, np.where(faces >= 0, faces - rows.start, -1)), cloth.flat[rows])
         files.append(path.name)
     if usd:
         write_sewn_usd(

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpflat._version import __version__
-from warpflat.core import atomic_path, optional_file, output_folder, require_own_metrics, write_report
+from warpflat.core import atomic_path, optional_file, output_folder, write_report
 from warpflat.garment.mannequin.picture import write_distance_picture, write_mannequin_picture
 from warpflat.garment.mannequin.usd import write_mannequin_usd
 
@@ -41,7 +41,6 @@ def write_mannequin(mannequin: Mannequin, folder: str | os.PathLike[str]) -> dic
     """
     names = {kind: name for kind, name in MANNEQUIN_FILES.items() if mannequin.scan is not None or kind != "distances"}
     with output_folder(folder, names.values(), sources=mannequin.sources, guard=True) as place:
-        require_own_metrics(place)
         files = {kind: place / name for kind, name in names.items()}
         write_mannequin_usd(mannequin, files["usd"])
         write_mannequin_obj(mannequin, files["obj"])

@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core import require_writable
 from warpflat.flat import vertex_normals
 from warpflat.pattern import (
     begin_stage,
     bounding_box,
     define_group,
     define_mesh,
+    define_subsets,
     export_stage,
-    set_points,
     usd_errors,
     valid_name,
 )
@@ -40,7 +39,6 @@ def write_mannequin_usd(mannequin: Mannequin, path: str | os.PathLike[str]) -> N
     """
     from pxr import Gf, Kind, Usd, UsdGeom, Vt
 
-    require_writable(path)
     with usd_errors(path):
         stage = Usd.Stage.CreateInMemory()
         begin_stage(stage)
@@ -68,26 +66,16 @@ def write_mannequin_usd(mannequin: Mannequin, path: str | os.PathLike[str]) -> N
 
 def _mesh(stage: Any, mannequin: Mannequin, part: str, *, on_body: bool) -> None:
     """Add the body, or the tube around both legs as a guide that renderers leave out."""
-    from pxr import Gf, UsdGeom, Vt
+    from pxr import UsdGeom, Vt
 
     layout = mannequin.layout
     chosen = layout.on_body == on_body
     corners, face_brick = layout.faces[chosen], layout.face_brick[chosen]
-    mesh = define_mesh(stage, f"/World/mannequin/{part}", corners)
+    mesh = define_mesh(stage, f"/World/mannequin/{part}", corners, mannequin.vertices, _CLOTH)
     if not on_body:
         mesh.CreatePurposeAttr(UsdGeom.Tokens.guide)
-    set_points(mesh, mannequin.vertices)
     normals = vertex_normals(mannequin.vertices, corners).astype(np.float32)
     mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(normals))
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
-    mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set(Vt.Vec3fArray([Gf.Vec3f(*_CLOTH)]))
-    taken: set[str] = set()
-    for index, name in enumerate(layout.bricks):
-        faces = np.flatnonzero(face_brick == index).astype(np.int32)
-        if not len(faces):
-            continue
-        subset = UsdGeom.Subset.CreateGeomSubset(
-            mesh, valid_name(name, taken), UsdGeom.Tokens.face, Vt.IntArray.FromNumpy(faces), "brick",
-            UsdGeom.Tokens.partition,
-        )  # fmt: skip
-        subset.GetPrim().SetDisplayName(name)
+    bricks = {name: np.flatnonzero(face_brick == index) for index, name in enumerate(layout.bricks)}
+    define_subsets(mesh, "brick", {name: faces for name, faces in bricks.items() if len(faces)})

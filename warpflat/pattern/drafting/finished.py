@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from warpflat.core import FloatArray, polyline_length, without_side
+from warpflat.core import FloatArray, line_name, polyline_length, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.sewing_tasks import is_flounce
 from warpflat.pattern.drafting.words import translate, translate_name
@@ -31,7 +31,7 @@ def finished_lengths(garment: DraftedGarment, size: str) -> dict[str, float]:
     """
     drafted = {piece.name: piece for piece in garment.pieces[size]}
     pieces = [piece for piece in drafted.values() if piece.piece.role == "shell" and not is_flounce(piece.piece)]
-    legs = any(_called(seam.name) == "inseam" for seam in garment.seams)
+    legs = any(line_name(seam.name) == "inseam" for seam in garment.seams)
     banded = any(piece.piece.role == "waistband" for piece in drafted.values())
     found: dict[str, float] = {}
     for line, words in _LINES.items():
@@ -39,13 +39,13 @@ def finished_lengths(garment: DraftedGarment, size: str) -> dict[str, float]:
         lengths: dict[str, float] = {}
         ends, beside = False, set[str]()
         for piece in pieces:
-            stretches = [edge.line for edge in piece.edges if _called(edge.name) == line]
-            within = [(_called(name), points) for name, points in piece.internal_lines.items()]
+            stretches = [edge.line for edge in piece.edges if line_name(edge.name) == line]
+            within = [(line_name(name), points) for name, points in piece.internal_lines.items()]
             # Inside a piece the line of a leg is another one above the hip.
             above = [points[::-1] for name, points in within if line == "outseam" and name == "side"]
             stretches += [np.concatenate([*above, points]) for name, points in within if name == line]
             if stretches:
-                beside.update(_called(edge.name) for edge in piece.edges)
+                beside.update(line_name(edge.name) for edge in piece.edges)
                 sums = [polyline_length(points) for points in stretches]
                 key = without_side(piece.name) if line == "centre back" else line
                 length = sum(sums) if line == "centre back" else max(sums)
@@ -55,7 +55,7 @@ def finished_lengths(garment: DraftedGarment, size: str) -> dict[str, float]:
                 lengths[key] = max(length + more, lengths.get(key, 0.0))
                 ends = ends or more > 0.0 or any(edge.kind == "hem" for edge in piece.edges)
         for seam in garment.seams:
-            if seam.size == size and _called(seam.name) == line != "centre back":
+            if seam.size == size and line_name(seam.name) == line != "centre back":
                 lengths[line] = max(1e-3 * max(seam.length_mm), lengths.get(line, 0.0))
         if line == "inseam" and "thigh" in beside:
             # It ends where legs begin.
@@ -70,7 +70,7 @@ def finished_lengths(garment: DraftedGarment, size: str) -> dict[str, float]:
     for piece in (piece for piece in drafted.values() if piece.piece.role == "shell"):
         count = piece.piece.quantity * (2 if piece.piece.on_fold else 1)
         for edge in piece.edges:
-            name = _called(edge.name)
+            name = line_name(edge.name)
             if edge.kind == "hem" and not set(name.split(" ")) & {"facing", "vent", "slit", "edge"}:
                 # Around one sleeve or leg where there are two.
                 both = 2 if without_side(edge.name) != edge.name and count > 1 else 1
@@ -106,14 +106,10 @@ def _laps(piece: DraftedPiece, hem: FloatArray) -> float:
     """Return what of a hem (#P by 2 [m]) of one half of a front lies beyond its centre line, over or under the other half [m]."""
     import shapely.ops
 
-    centre = [line for name, line in piece.internal_lines.items() if _called(name) == "centre front"]
+    centre = [line for name, line in piece.internal_lines.items() if line_name(name) == "centre front"]
     if len(centre) != 1 or not piece.piece.is_pair:
         return 0.0
     way = (centre[0][-1] - centre[0][0]) / np.linalg.norm(centre[0][-1] - centre[0][0])
     parts = shapely.ops.split(shapely.LineString(hem), shapely.LineString([centre[0][0] - way, centre[0][-1] + way]))
     # The narrower part lies beyond it.
     return float(min(part.length for part in parts.geoms)) if len(parts.geoms) == 2 else 0.0
-
-
-def _called(name: str) -> str:
-    return without_side(name).rstrip(" 0123456789")

@@ -94,11 +94,11 @@ def fit_edges(
         pairs = list[tuple[EdgeKey, EdgeKey, bool, float]]()
         for seam in seams:
             (one, *more), (other, *others) = seam.sides
-            ends = (one.piece, one.edge), (other.piece, other.edge)
+            ends = one.place, other.place
             if not more and not others and ends[0] != ends[1]:
                 pairs.append((*ends, one.reversed != other.reversed, seam.ease))
                 continue
-            for key in {(side.piece, side.edge) for row in seam.sides for side in row}:
+            for key in {side.place for side in seam.stretches}:
                 # Of several edges each keeps its own length as it is smoothed: so do both sides.
                 width, arc = fitted[key][1], arc_lengths(lines[key])
                 if width > TOLERANCE and abs(fitted[key][0].length - arc[-1]) > EQUAL:
@@ -212,7 +212,7 @@ def equal_sides(
         # How the difference grows with each bump, over its cost.
         ways, total = dict[EdgeKey, dict[int, FloatArray]](), 0.0
         for row, of_side in zip(seam.sides, (-(1.0 + seam.ease), 1.0), strict=True):
-            for key in ((side.piece, side.edge) for side in row):
+            for key in (side.place for side in row):
                 line = found[key].sample()
                 if found[key].straight.all() or len(line) < 3:
                     continue
@@ -296,7 +296,7 @@ def as_in_layout(
     # Chords on one side of a seam may change an edge of another one.
     while straying := [seam for seam in unchecked if strays(seam)]:
         for seam in straying:
-            found |= {key: flat[key] for row in seam.sides for key in ((side.piece, side.edge) for side in row)}
+            found |= {side.place: flat[side.place] for side in seam.stretches}
         unchecked = [seam for seam in unchecked if seam not in straying]
     return {key: curve for key, (curve, _) in found.items()}
 
@@ -409,7 +409,7 @@ def _keep_near(
             near, before = (_difference(*_both((sides, ease), lines, curves)) for curves in (tried, fitted))
             # On a coarse mesh neither may be as close as it should be.
             if before <= max(near, 1.0):
-                tried |= {key: fitted[key] for row in sides for key in ((side.piece, side.edge) for side in row)}
+                tried |= {key: fitted[key] for row in sides for key in (side.place for side in row)}
         unchecked = [seam for seam in unchecked if seam not in unequal]
     fitted |= tried
 

@@ -207,11 +207,7 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
         n for n in piece.notches if n.seam not in dart_names and n.edge in names and side * (n.at[0] - axis) > -ON_AXIS
     ]
     across = {
-        seam.name
-        for seam in garment.garment.seams
-        for row in seam.sides
-        for s in row
-        if s.piece == piece.name and s.edge in names
+        seam.name for seam in garment.garment.seams for s in seam.stretches if s.piece == piece.name and s.edge in names
     }
     across -= {notch.seam for notch in on_side}
     flip, moved_by = np.array([-1.0, 1.0]), np.array([2 * axis, 0.0])

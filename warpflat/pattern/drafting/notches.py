@@ -97,7 +97,7 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
     for number, seam in enumerate(seams):
         for at, row in enumerate(seam.sides):
             for place, side in enumerate(row):
-                sewn.setdefault((side.piece, side.edge), []).append((number, at, place))
+                sewn.setdefault(side.place, []).append((number, at, place))
     groups = copied_together(seams)
     #: By group of seams and edge the lengths along it at which it has a notch.
     placed: dict[tuple[str, str, str], list[float]] = {}
@@ -184,8 +184,8 @@ def copied_together(seams: Sequence[Seam]) -> dict[str, str]:
     first: dict[str, str] = {seam.name: seam.name for seam in seams}
     at: dict[tuple[str, str], dict[tuple[bool, int], str]] = {}
     for seam in seams:
-        for side in (side for row in seam.sides for side in row):
-            at.setdefault((side.piece, side.edge), {}).setdefault((side.mirrored, side.copy), seam.name)
+        for side in seam.stretches:
+            at.setdefault(side.place, {}).setdefault((side.mirrored, side.copy), seam.name)
     for copies in at.values():
         joined = {first[name] for name in copies.values()}
         into = next(name for name in first if first[name] in joined)

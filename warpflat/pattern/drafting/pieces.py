@@ -150,6 +150,11 @@ class SeamSide:
     copy: int = 0
 
     @property
+    def place(self) -> tuple[str, str]:
+        """Names of the piece and the edge."""
+        return self.piece, self.edge
+
+    @property
     def is_drawn(self) -> bool:
         """Whether it is the piece itself, not another copy."""
         return not self.mirrored and self.copy == 0
@@ -223,6 +228,11 @@ class Seam:
         if any(not 0 < f < 1 for row in (self.notches or (), *self.size_notches.values()) for f in row):
             raise InputError(f"seam {self.name!r}: notches {self.notches}; each must be a fraction between 0 and 1")
 
+    @property
+    def stretches(self) -> tuple[SeamSide, ...]:
+        """The stretches of both sides, those of the first side first."""
+        return (*self.sides[0], *self.sides[1])
+
     def of_size(self, size: str) -> Seam:
         """Return the seam with the notches of one size."""
         return replace(self, notches=self.size_notches[size]) if size in self.size_notches else self
@@ -293,7 +303,7 @@ class Pattern:
                     raise InputError(f"piece {piece.name!r} says size {piece.size!r} but is listed under {size!r}")
             # Every seam's edges exist in every size, and none is on the fold.
             for seam in self.seams:
-                for side in (*seam.sides[0], *seam.sides[1]):
+                for side in seam.stretches:
                     try:
                         piece = self.piece(side.piece, size)
                         edge = piece.edge(side.edge)
@@ -325,7 +335,7 @@ class Pattern:
         if any(all(piece.name in names for piece in row) for row in self.pieces.values()):
             raise InputError("none of the pieces can be drawn")
         pieces = {size: [piece for piece in row if piece.name not in names] for size, row in self.pieces.items()}
-        seams = [seam for seam in self.seams if not any(s.piece in names for s in (*seam.sides[0], *seam.sides[1]))]
+        seams = [seam for seam in self.seams if not any(s.piece in names for s in seam.stretches)]
         return replace(self, pieces=pieces, seams=seams)
 
     def check_size(self, size: str) -> None:

@@ -34,7 +34,7 @@ def seam_words(seams: Iterable[Seam]) -> dict[tuple[str, str], list[str]]:
                 words = f"{seam.name} | side {number} part {part} | {how}"
                 if seam.ease:
                     words += f" | ease {seam.ease:.6g} {seam.eased[0]:.6g} {seam.eased[1]:.6g}"
-                found.setdefault((side.piece, side.edge), []).append(words)
+                found.setdefault(side.place, []).append(words)
     return found
 
 

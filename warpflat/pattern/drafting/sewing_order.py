@@ -357,7 +357,7 @@ class _Workshop(SewingTasks):
                 ready.remove(task)
                 for seam in task.seams:
                     whole.update(frozenset(pair) for pair in self._ends(seam))
-                    parts = [(s.piece, s.mirrored, s.copy) for row in seam.sides for s in row]
+                    parts = [(s.piece, s.mirrored, s.copy) for s in seam.stretches]
                     names = {cloth.get(part, part) for part in parts}
                     cloth |= dict.fromkeys(parts, parts[0])
                     cloth = {part: parts[0] if name in names else name for part, name in cloth.items()}
@@ -378,9 +378,9 @@ class _Workshop(SewingTasks):
         if not task.seams:
             return []
         seam, group, pieces = task.seams[0], task.seams, self.pieces
-        joined = [pieces[side.piece] for row in seam.sides for side in row]
+        joined = [pieces[side.piece] for side in seam.stretches]
         sideless = len(group) > 1 or (not seam.openings and task.like is None and self.stands_for_both(group))
-        places = [(side.piece, side.edge) for each in group for row in each.sides for side in row]
+        places = [side.place for each in group for side in each.stretches]
         if any(pieces[piece].quantity % 2 == 0 for piece, _ in places):
             # What is cut twice is drawn for one side, and sewn to both.
             places += [(piece, other_side(edge)) for piece, edge in places if pieces[piece].quantity == 1]
@@ -397,8 +397,8 @@ class _Workshop(SewingTasks):
         # Seams called by their pieces have numbers from the second on; those of facings, and of equal pieces between others, are said
         # by theirs, too.
         by_pieces = re.sub(r" \d+$", "", seam.name) == joint_words(seam) or task.technique == "facing_join"
-        copied = any(part.copy for each in group for row in each.sides for part in row)
-        equal = copied and len({part.piece for each in group for row in each.sides for part in row}) > 2
+        copied = any(part.copy for each in group for part in each.stretches)
+        equal = copied and len({part.piece for each in group for part in each.stretches}) > 2
         by_pieces = by_pieces or equal
         first, second = (self._words([each.sides[k] for each in (group if equal else group[:1])]) for k in (0, 1))
         if not by_pieces:

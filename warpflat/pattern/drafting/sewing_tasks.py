@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from importlib import resources
 from typing import Any
 
-from warpflat.core import other_side, polyline_length, read_toml, without_side
+from warpflat.core import line_name, other_side, polyline_length, read_toml, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
@@ -61,7 +61,7 @@ class Task:
     @property
     def sewn(self) -> list[Place]:
         """Pieces and edges of its seams."""
-        return [(side.piece, side.edge) for seam in self.seams for row in seam.sides for side in row]
+        return [side.place for seam in self.seams for side in seam.stretches]
 
     @property
     def how(self) -> Mapping[str, Any]:
@@ -118,8 +118,8 @@ class SewingTasks:
         seam, other = group[0], other_side(group[0].name)
         if len(group) > 1 or (other != seam.name and other in {each.name for each in self.seams}):
             return False
-        joined = [self.pieces[side.piece] for row in seam.sides for side in row]
-        within = not any(side.mirrored or side.copy for row in seam.sides for side in row)
+        joined = [self.pieces[side.piece] for side in seam.stretches]
+        within = not any(side.mirrored or side.copy for side in seam.stretches)
         if within and all(piece.quantity == 2 and not piece.on_fold for piece in joined):
             return True
         return other != seam.name and all(piece.on_fold or piece.is_pair for piece in joined)
@@ -135,7 +135,7 @@ class SewingTasks:
         several = {piece for piece, _ in places if len({widths[each] for each in places if each[0] == piece}) > 1}
         alike = {width for place, width in widths.items() if place[0] in several}
         for piece, edge in places:
-            row, name = widths[piece, edge], translate_name(without_side(edge).rstrip(" 0123456789"))
+            row, name = widths[piece, edge], translate_name(line_name(edge))
             if technique != "hem":
                 row = name
             elif row in alike:
@@ -160,23 +160,23 @@ class SewingTasks:
             # What of a pocket lies in another seam is sewn with that.
             roles -= {"pocket"}
         technique = next((name for name, each in techniques().items() if sorted(roles) in each.get("joins", ())), "")
-        joined = [self.pieces[side.piece] for row in seam.sides for side in row]
+        joined = [self.pieces[side.piece] for side in seam.stretches]
         strips = [piece for piece in joined if piece.role in ("strip", "waistband")]
         folded = any("fold line" in strip.internal_lines for strip in strips)
-        if technique == "strip_join" and (len(group) > 1 or any(side.copy for row in seam.sides for side in row)):
+        if technique == "strip_join" and (len(group) > 1 or any(side.copy for side in seam.stretches)):
             return "panel_join"
         if technique == "binding":
             hemmed = any(edge.kind == "hem" for strip in strips for edge in strip.edges)
             return "ruffle" if hemmed else "rib" if folded else "binding"
         if technique == "waistband_layers" and folded:
-            ring = any({side.piece for row in each.sides for side in row} == {strips[0].name} for each in self.seams)
+            ring = any({side.piece for side in each.stretches} == {strips[0].name} for each in self.seams)
             return "waistband_ring" if ring else "waistband_ends"
         if technique == "collar":
             falls = [each for each in self.seams if self._is_fall(each)]
             stands = {side.piece for each in falls for side in each.sides[1]}
             return "stand_and_fall" if seam in falls or joined[0].name in stands else "collar"
         if technique == "collar_on":
-            faced = {side.piece for row in seam.sides for side in row if self._grown_on(side.piece)}
+            faced = {side.piece for side in seam.stretches if self._grown_on(side.piece)}
             if faced and all(self._free_beside_fold(piece) for piece in faced):
                 return "collar_between"
             if self._turned_over(seam):
@@ -211,7 +211,7 @@ class SewingTasks:
 
     def _free_beside_fold(self, piece: str) -> list[str]:
         """Return the edges beside a grown-on facing that no seam takes: the upper end of a button stand beside a collar."""
-        taken = {(side.piece, side.edge) for seam in self.seams for row in seam.sides for side in row}
+        taken = {side.place for seam in self.seams for side in seam.stretches}
         order, grown = self.order[piece], self._grown_on(piece)
         beside = [order[(order.index(edge) + step) % len(order)] for edge in grown for step in (-1, 1)]
         return [
@@ -222,32 +222,27 @@ class SewingTasks:
 
     def _turned_over(self, seam: Seam) -> list[Place]:
         """Return what no seam takes beside a collar: ends of facings, which are turned over its ends, and of button stands."""
-
-        def stem(edge: str) -> str:
-            return without_side(edge).rstrip(" 0123456789")
-
-        taken = {(side.piece, side.edge) for each in self.seams for row in each.sides for side in row}
-        shell = [side for row in seam.sides for side in row if self.pieces[side.piece].role == "shell"]
+        taken = {side.place for each in self.seams for side in each.stretches}
+        shell = [side for side in seam.stretches if self.pieces[side.piece].role == "shell"]
         facings = {
             side.piece
             for each in self.seams
-            if {other.piece for row in each.sides for other in row} & {other.piece for other in shell}
-            for row in each.sides
-            for side in row
+            if {other.piece for other in each.stretches} & {other.piece for other in shell}
+            for side in each.stretches
             if self.pieces[side.piece].role == "facing"
         }
-        along = {stem(side.edge) for side in shell}
+        along = {line_name(side.edge) for side in shell}
         return [
             (piece, edge)
             for piece in [*sorted(facings), *(pieces_of((side.piece, "") for side in shell) if facings else ())]
             for edge in self.order[piece]
-            if (piece, edge) not in taken and stem(edge) in along
+            if (piece, edge) not in taken and line_name(edge) in along
         ]
 
     def _finish(self, garment: DraftedGarment) -> None:
         """Add the tasks that finish edges and pieces, until every free edge is used up by one of them."""
         drafted, units = list(self.drafted.values()), self.units
-        sewn = {(side.piece, side.edge) for seam in self.seams for row in seam.sides for side in row}
+        sewn = {side.place for seam in self.seams for side in seam.stretches}
         # What is cut twice is drawn for one side.
         sewn |= {(of, other_side(edge)) for piece, edge in sewn for of in (piece, other_side(piece))}
         free = {
@@ -382,7 +377,7 @@ class SewingTasks:
                 (piece.name, edge.name)
                 for piece in self.pieces.values()
                 for edge in piece.edges
-                if without_side(edge.name).rstrip(" 0123456789") == elastic.edge
+                if line_name(edge.name) == elastic.edge
             ]
             cased = take([place for place in along if free.get(place) == "hem"])
             values = {
@@ -462,11 +457,11 @@ def is_flounce(piece: Piece) -> bool:
 def _mirror_groups(seams: Sequence[Seam]) -> list[list[Seam]]:
     """Return seams that are each other's mirror images together, which are sewn alike."""
     groups: dict[object, list[Seam]] = {}
-    copied = {(s.piece, s.edge) for seam in seams for row in seam.sides for s in row if s.copy}
+    copied = {s.place for seam in seams for s in seam.stretches if s.copy}
     alike: dict[tuple[str, str], object] = {}
     for seam in seams:
         # Edges of equal pieces, of which one is drawn, have the notches of one seam.
-        own = [(s.piece, s.edge) for row in seam.sides for s in row if (s.piece, s.edge) in copied]
+        own = [s.place for s in seam.stretches if s.place in copied]
         if own:
             key = next((alike[edge] for edge in own if edge in alike), own[0])
             alike |= dict.fromkeys(own, key)

@@ -93,7 +93,7 @@ def true_corners(
     away = {corner: abs(corner.angle(start) - corner.wanted) for corner in found.values()}
     corners = [corner for corner in found.values() if away[corner] < MEANT]
     shares = np.array([min(1.0, (MEANT - away[corner]) / (MEANT - DOUBTED)) for corner in corners])
-    sewn = {(side.piece, side.edge) for seam in seams for row in seam.sides for side in row}
+    sewn = {side.place for seam in seams for side in seam.stretches}
     turns: dict[End, float] = {}
     trued, moves = dict(start), dict[End, float]()
     for _ in range(ROUNDS):
@@ -197,7 +197,7 @@ def _corner_between(pieces: Mapping[str, Piece], seam: str, sides: Sequence[tupl
         other = edges[(number + (1 if at_end else -1)) % len(edges)]
         if other.kind in ("fold", "dart") or other.name == side.edge:
             return None
-        seam_end, outer_end = ((side.piece, side.edge), at_end), ((side.piece, other.name), not at_end)
+        seam_end, outer_end = (side.place, at_end), ((side.piece, other.name), not at_end)
         pairs.append((seam_end, outer_end) if at_end else (outer_end, seam_end))
         outer.append(outer_end)
     runs_on = " to ".join(f"{piece}.{edge}" for (piece, edge), _ in outer)

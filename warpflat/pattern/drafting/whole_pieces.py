@@ -36,7 +36,7 @@ def whole_pieces(
         InputError: a piece has two folds, or a seam names what is not cut.
     """
     given = {piece.name: piece for piece in pieces}
-    sides = [side for seam in seams for chain in seam.sides for side in chain]
+    sides = [side for seam in seams for side in seam.stretches]
     asked = {side.piece for side in sides if side.mirrored}
     sewn = set(given) if unsewn else {side.piece for side in sides}
     halves = {name for name, piece in given.items() if piece.on_fold}
@@ -44,7 +44,7 @@ def whole_pieces(
         name for name, p in given.items() if name not in halves and (name in asked or (p.quantity == 2 and p.paired))
     }
     # A cuff is sewn to each of two sleeves, whether it is cut turned over or not.
-    pairs = [{side.piece for chain in seam.sides for side in chain} for seam in seams]
+    pairs = [{side.piece for side in seam.stretches} for seam in seams]
     flagged = {
         side.piece for seam in seams if any(s.mirrored for c in seam.sides for s in c) for c in seam.sides for side in c
     }
@@ -66,15 +66,15 @@ def whole_pieces(
     # Seams on the other side of the body.
     flipped = []
     for seam in seams:
-        if all(side.piece in halves | twice for chain in seam.sides for side in chain):
+        if all(side.piece in halves | twice for side in seam.stretches):
             one, other = (tuple(replace(side, mirrored=not side.mirrored) for side in row) for row in seam.sides)
             flipped.append(replace(seam, name=seam.name + MIRRORED, sides=(one, other)))
     for seam in (*seams, *flipped):
         plain = replace(seam, sides=(_named(seam.sides[0], halves), _named(seam.sides[1], halves)))
-        edges = {(side.piece, side.edge) for chain in plain.sides for side in chain}
+        edges = {side.place for side in plain.stretches}
         if seam in flipped and edges & taken:
             continue
-        for side in (side for chain in plain.sides for side in chain):
+        for side in plain.stretches:
             if side.piece not in whole:
                 raise InputError(f"seam {seam.name!r}: {side.piece!r} is not cut; its piece needs a quantity of 2")
         taken |= edges

@@ -13,6 +13,7 @@ from warpflat.core import FloatArray, IntArray, weighted_percentile
 __all__ = [
     "DRAFTED_CLOTH",
     "ENERGY",
+    "LEAST_GAP",
     "SHARE",
     "SKIN",
     "SMALLEST_SCALE",
@@ -27,6 +28,8 @@ __all__ = [
 ENERGY = "energy"
 #: Colours of bodies, and of cloth that was drafted and bears no map, sRGB.
 SKIN, DRAFTED_CLOTH = (0.88, 0.86, 0.82), (0.62, 0.64, 0.68)
+#: The least upper end of a scale of gaps between cloth and body [mm].
+LEAST_GAP = 5.0
 #: Of the cloth, by area, within a scale: a few sliver faces would otherwise make the rest of a map pale.
 SHARE = 0.98
 

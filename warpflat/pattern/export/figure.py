@@ -105,21 +105,22 @@ def write_figure(path: str | os.PathLike[str], figure: Figure) -> None:
 
 
 def write_moving_picture(
-    path: str | os.PathLike[str], pictures: Sequence[Image.Image], durations: Sequence[int]
+    path: str | os.PathLike[str], pictures: Sequence[Image.Image], *, each: int, last: int
 ) -> None:
     """Write pictures of one size as a moving WebP that begins anew after its end; atomically.
 
     Args:
         path: the file, ``*.webp``.
         pictures: RGB.
-        durations: of each [ms].
+        each, last: how long each is shown, and the last one [ms].
 
     Raises:
         InputError: the file cannot be written.
     """
     more = {"save_all": True, "append_images": pictures[1:]} if len(pictures) > 1 else {}
+    durations = [*[each] * (len(pictures) - 1), last]
     with atomic_path(path) as temporary:
-        pictures[0].save(temporary, format="WEBP", duration=list(durations), loop=0, quality=80, **more)
+        pictures[0].save(temporary, format="WEBP", duration=durations, loop=0, quality=80, **more)
 
 
 def on_paper(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -74,7 +74,7 @@ def garmentcode_json(garment: DraftedGarment, *, size: str | None = None) -> tup
     splits: dict[EdgeKey, list[_Split]] = {key: [] for key in lines}
     stitches, sewn = list[tuple[tuple[_Split, ...], str]](), set[EdgeKey]()
     for seam in seams:
-        edges_of = [(side.piece, side.edge) for chain in seam.sides for side in chain]
+        edges_of = [side.place for side in seam.stretches]
         if sewn & set(edges_of):
             left_out.append(
                 f"seam {seam.name!r}: one of its edges is in another seam, and GarmentCode stitches an edge once: left out"
@@ -270,7 +270,7 @@ class _Strand:
         if side.reversed:
             control, a = control[::-1], float(arc[-1]) - b
         found = _Split(
-            key=(side.piece, side.edge),
+            key=side.place,
             begin=float(a),
             at=low,
             reversed=side.reversed,

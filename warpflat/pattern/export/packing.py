@@ -1,10 +1,15 @@
-"""Boxes on a page: in rows, or wherever there is room."""
+"""Boxes on a page or a table: in rows, or wherever there is room."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
-__all__ = ["pack_boxes", "pack_rows"]
+import numpy as np
+
+from warpflat.core import FloatArray
+
+__all__ = ["pack_boxes", "pack_rows", "rows_on_table"]
 
 
 def pack_rows(sizes: Sequence[tuple[float, float]], width: float) -> tuple[list[tuple[float, float]], float, float]:
@@ -17,6 +22,29 @@ def pack_rows(sizes: Sequence[tuple[float, float]], width: float) -> tuple[list[
         right, foot = right + wide, max(foot, top + high)
         widest = max(widest, right)
     return places, widest, foot
+
+
+def rows_on_table(sizes: FloatArray, gap: float) -> FloatArray:
+    """Return the lower left corner of each of several boxes, laid out in rows, so many that the whole is near to 16 by 9.
+
+    Args:
+        sizes: #B by 2 [m].
+        gap: between boxes and between rows [m].
+    """
+    spaced = [(wide + gap, high + gap) for wide, high in sizes.tolist()]
+    whole, widest = sum(wide for wide, _ in spaced), float(sizes[:, 0].max())
+
+    def in_rows(rows: int) -> FloatArray:
+        places, _, _ = pack_rows(spaced, max(1.05 * whole / rows, widest) + gap)
+        left, top = np.array(places).T
+        foot = top + sizes[:, 1]
+        return np.column_stack([left, foot.max() - foot])
+
+    def unlikeness(corners: FloatArray) -> float:
+        wide, high = (corners + sizes).max(axis=0)
+        return abs(math.log(max(wide, 1e-9) / max(high, 1e-9) * 9.0 / 16.0))
+
+    return min(map(in_rows, range(1, 5)), key=unlikeness)
 
 
 def pack_boxes(sizes: Sequence[tuple[float, float]], width: float) -> tuple[list[tuple[float, float]], float, float]:

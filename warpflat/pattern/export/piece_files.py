@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpflat.core import energy_words, file_in, optional_file, output_folder, require_own_metrics, write_report
+from warpflat.core import energy_words, file_in, optional_file, output_folder, write_report
 from warpflat.flat import Flattening, worn_strain
 from warpflat.pattern.export.obj import write_obj
 
@@ -36,7 +36,6 @@ def save_piece(pattern: Flattening, folder: str | Path, *, picture: bool = True,
     """
     others = [*(["frames.usdc"] if frames else []), *(["picture.png"] if picture else []), "metrics.json"]
     with output_folder(folder, others, sources=pattern.surface.sources, guard=True) as to:
-        require_own_metrics(to)
         files = write_pieces([pattern], to, picture=picture, frames=frames)
         write_report(to / "metrics.json", pattern.metrics(), name=pattern.surface.name, files=files)
     return [*files, "metrics.json"]

@@ -13,7 +13,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, IntArray
 from warpflat.flat import triangulate, vertex_normals
-from warpflat.pattern.export.usd_prims import define_mesh, export_stage, set_points, valid_name
+from warpflat.pattern.export.usd_prims import begin_stage, define_mesh, define_subsets, export_stage
 
 __all__ = ["write_sewn_usd"]
 
@@ -47,13 +47,8 @@ def write_sewn_usd(
     from pxr import Kind, Sdf, Usd, UsdGeom, Vt
 
     stage = Usd.Stage.CreateInMemory()
-    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-    root = UsdGeom.Xform.Define(stage, "/Root").GetPrim()
-    Usd.ModelAPI(root).SetKind(Kind.Tokens.component)
-    stage.SetDefaultPrim(root)
-    mesh = define_mesh(stage, "/Root/garment", faces)
-    set_points(mesh, points)
+    begin_stage(stage, root="/Root", kind=Kind.Tokens.component)
+    mesh = define_mesh(stage, "/Root/garment", faces, points)
     triangles, _ = triangulate(faces)
     normals = vertex_normals(points, triangles).astype(np.float32)
     mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(normals))
@@ -69,13 +64,7 @@ def write_sewn_usd(
     st.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(1e3 * laid, dtype=np.float32)))
     st.SetIndices(Vt.IntArray.FromNumpy(np.ascontiguousarray(flat_faces[used], dtype=np.int32)))
     st.GetAttr().SetCustomDataByKey("unit", "mm")
-    taken: set[str] = set()
-    for name, rows in pieces.items():
-        subset = UsdGeom.Subset.CreateGeomSubset(
-            mesh, valid_name(name, taken), UsdGeom.Tokens.face, Vt.IntArray(range(rows.start, rows.stop)), "piece",
-            UsdGeom.Tokens.partition,
-        )  # fmt: skip
-        subset.GetPrim().SetDisplayName(name)
+    define_subsets(mesh, "piece", {name: np.arange(rows.start, rows.stop) for name, rows in pieces.items()})
     seams = _seam_edges(faces, flat_faces)
     mesh.CreateCreaseIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(seams.ravel(), dtype=np.int32)))
     mesh.CreateCreaseLengthsAttr(Vt.IntArray([2] * len(seams)))

@@ -8,20 +8,19 @@ ever reached. Then the file takes its final name.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Generator, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from warpflat._version import __version__
-from warpflat.core import FloatArray, InputError, atomic_path, hidden_file, require_writable
+from warpflat.core import FloatArray, InputError, atomic_path
 from warpflat.flat import Surface, triangulate, vertex_normals
 from warpflat.pattern.export.colours import VertexColours, energy_scale
 from warpflat.pattern.export.geometry import Polylines, face_areas, polylines_of
+from warpflat.pattern.export.packing import rows_on_table
 from warpflat.pattern.export.usd_prims import (
     FIRST_FRAME,
     MeshSamples,
@@ -37,7 +36,6 @@ from warpflat.pattern.export.usd_prims import (
     last_values_as_defaults,
     part_path,
     require_usd,
-    rows_on_table,
     set_face_map,
     set_points,
     usd_errors,
@@ -203,7 +201,6 @@ class FrameWriter:
         self._bodies: list[FloatArray] = []
         self._unsaved = self._unsaved_vertices = 0
         self._stage: Any = None
-        self._hidden = ExitStack()
 
     def __enter__(self) -> FrameWriter:
         """Open the hidden working file.
@@ -211,28 +208,30 @@ class FrameWriter:
         Raises:
             InputError: the place cannot be written.
         """
-        from pxr import Usd
-
-        require_writable(self._final)
-        if self._final.suffix != ".usdc":  # the only format that can be saved bit by bit
-            raise InputError(f"cannot write {self._final}: USD frames need the suffix .usdc")
-        try:
-            self._working = self._hidden.enter_context(hidden_file(self._final))
-            with usd_errors(self._final):
-                self._stage = Usd.Stage.CreateNew(str(self._working))
-            begin_stage(self._stage, is_film=True)
-            self._stage.GetRootLayer().documentation = f"Flat patterns while they relax, by warpflat {__version__}"
-        except BaseException:
-            self._hidden.close()
-            raise
+        self._writing = self._write_file()
+        next(self._writing)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Place and dress if the block ended well, and give the file its name; the working file is removed in any case."""
-        with self._hidden:
-            if kind is None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        """Complete the file and give it its name if the block ended well; otherwise remove it."""
+        if kind is None:
+            next(self._writing, None)
+        else:
+            self._writing.close()
+
+    def _write_file(self) -> Generator[None, None, None]:
+        """Open the file, and complete it once the block has ended well."""
+        from pxr import Usd
+
+        if self._final.suffix != ".usdc":  # the only format that can be saved bit by bit
+            raise InputError(f"cannot write {self._final}: USD frames need the suffix .usdc")
+        with atomic_path(self._final) as working:
+            try:
+                with usd_errors(self._final):
+                    self._stage = Usd.Stage.CreateNew(str(working))
+                begin_stage(self._stage, is_film=True)
+                self._stage.GetRootLayer().documentation = f"Flat patterns while they relax, by warpflat {__version__}"
+                yield
                 with usd_errors(self._final):
                     self._place()
                     add_light(self._stage)
@@ -246,13 +245,11 @@ class FrameWriter:
                             add_texture_coordinates(samples.mesh, piece.surface, piece.faces, piece.last_positions)
                     last_values_as_defaults(self._stage, self._stage.Traverse())
                     self._save()
-            # Nothing may hold the file open when it is moved.
-            self._stage = None
-            self._pieces.clear()
-            if kind is None:
-                with atomic_path(self._final) as temporary:
-                    require_usd(self._working, self._final)
-                    self._working.replace(temporary)
+            finally:
+                # Nothing may hold the file open when it is moved.
+                self._stage = None
+                self._pieces.clear()
+            require_usd(working, self._final)
 
     def add_piece(self, name: str, surface: Surface) -> None:
         """Author the surface of a piece with its feature lines, and prepare its pattern.
@@ -296,15 +293,14 @@ class FrameWriter:
 
     def show_drafted(self, surfaces: Sequence[Surface]) -> None:
         """Show pieces that have no frames, such as collars, where they are worn: meshes of one colour below `/World/drafted`."""
-        from pxr import Gf, Kind, UsdGeom
+        from pxr import Kind
 
         taken = set[str]()
         define_group(self._stage, DRAFTED, kind=Kind.Tokens.component)
         for surface in surfaces:
-            mesh = define_mesh(self._stage, f"{DRAFTED}/{valid_name(surface.name, taken)}", surface.faces)
+            path = f"{DRAFTED}/{valid_name(surface.name, taken)}"
+            mesh = define_mesh(self._stage, path, surface.faces, surface.vertices, _DRAFTED_COLOUR)
             mesh.GetPrim().SetDisplayName(surface.name)
-            set_points(mesh, surface.vertices)
-            mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set([Gf.Vec3f(*_DRAFTED_COLOUR)])
             self._bodies.append(surface.vertices)
 
     def write(

@@ -8,7 +8,6 @@ before: where the lengths would agree, the last point is stored twice. No face u
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -34,11 +33,11 @@ __all__ = [
     "bounding_box",
     "define_group",
     "define_mesh",
+    "define_subsets",
     "export_stage",
     "last_values_as_defaults",
     "part_path",
     "require_usd",
-    "rows_on_table",
     "set_face_map",
     "set_points",
     "usd_errors",
@@ -131,9 +130,9 @@ def define_group(stage: Any, path: str, *, label: str | None = None, kind: str |
     return prim
 
 
-def begin_stage(stage: Any, *, is_film: bool = False) -> None:
-    """Set a stage to metres and Y up, and define `/World`, its default prim; a film begins at frame 1."""
-    from pxr import Kind, UsdGeom
+def begin_stage(stage: Any, *, root: str = "/World", kind: str = "assembly", is_film: bool = False) -> None:
+    """Set a stage to metres and Y up, and define its default prim; a film begins at frame 1."""
+    from pxr import UsdGeom
 
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
@@ -142,22 +141,43 @@ def begin_stage(stage: Any, *, is_film: bool = False) -> None:
         stage.SetFramesPerSecond(_RATE)
         stage.SetStartTimeCode(FIRST_FRAME)
         stage.SetEndTimeCode(FIRST_FRAME)
-    stage.SetDefaultPrim(define_group(stage, "/World", kind=Kind.Tokens.assembly))
+    stage.SetDefaultPrim(define_group(stage, root, kind=kind))
 
 
-def define_mesh(stage: Any, path: str, faces: IntArray | None = None) -> Any:
-    """Define a polygon mesh (no subdivision), seen from both sides; `faces` (#F by 4, -1 as the fourth of a triangle) hold for all time."""
-    from pxr import UsdGeom, Vt
+def define_mesh(
+    stage: Any, path: str, faces: IntArray | None = None, points: ArrayLike | None = None, colour: Sequence[float] = ()
+) -> Any:
+    """Define a polygon mesh (no subdivision), seen from both sides.
+
+    Args:
+        stage, path: where.
+        faces: for all time, #F by 3, or by 4 with -1 as the fourth of a triangle.
+        points: for all time, #P by 3 [m].
+        colour: of all of it, linear Rec. 709, if it has one.
+    """
+    from pxr import Gf, UsdGeom
 
     mesh = UsdGeom.Mesh.Define(stage, path)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.CreateOrientationAttr(UsdGeom.Tokens.rightHanded)
     mesh.CreateDoubleSidedAttr(True)
     if faces is not None:
-        used = faces >= 0
-        mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(used.sum(axis=1, dtype=np.int32)))
-        mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(faces[used], dtype=np.int32)))
+        set_faces(mesh, faces)
+    if points is not None:
+        set_points(mesh, points)
+    if colour:
+        mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set([Gf.Vec3f(*map(float, colour))])
     return mesh
+
+
+def set_faces(mesh: Any, faces: IntArray, time: Any = None) -> None:
+    """Author the faces of a mesh (#F by 3, or by 4 with -1 as the fourth of a triangle), from a time on or for all of it."""
+    from pxr import Usd, Vt
+
+    used, time = faces >= 0, Usd.TimeCode.Default() if time is None else time
+    mesh.CreateFaceVertexCountsAttr().Set(Vt.IntArray.FromNumpy(used.sum(axis=1, dtype=np.int32)), time)
+    corners = np.ascontiguousarray(faces[used], dtype=np.int32)
+    mesh.CreateFaceVertexIndicesAttr().Set(Vt.IntArray.FromNumpy(corners), time)
 
 
 def set_points(mesh: Any, points: ArrayLike, time: Any = None) -> None:
@@ -168,6 +188,19 @@ def set_points(mesh: Any, points: ArrayLike, time: Any = None) -> None:
     time = Usd.TimeCode.Default() if time is None else time
     mesh.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(stored), time)
     mesh.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(bounding_box(stored)), time)
+
+
+def define_subsets(mesh: Any, family: str, faces: Mapping[str, NDArray[Any]]) -> None:
+    """Define GeomSubsets that part a mesh, with the names of their faces (#S each) as display names."""
+    from pxr import UsdGeom, Vt
+
+    taken = set[str]()
+    for name, rows in faces.items():
+        indices = Vt.IntArray.FromNumpy(rows.astype(np.int32))
+        subset = UsdGeom.Subset.CreateGeomSubset(
+            mesh, valid_name(name, taken), UsdGeom.Tokens.face, indices, family, UsdGeom.Tokens.partition
+        )
+        subset.GetPrim().SetDisplayName(name)
 
 
 def last_values_as_defaults(stage: Any, prims: Iterable[Any]) -> None:
@@ -233,23 +266,14 @@ class MeshSamples:
         self._colours.SetCustomData({"quantity": quantity, "unit": unit, "rangeMin": 0.0, "rangeMax": float(scale)})
         self._stored = 0
         self._padding = 0
-        self._points: Any = None
-        self._extent: Any = None
 
     def write(self, time: Any, points: NDArray[np.float32], faces: IntArray | None = None) -> None:
         """Write the points (#P by 3) [m]; `faces` (#F by 4) begin a new topology."""
-        from pxr import Vt
-
         if faces is not None:
             self._padding = 1 if len(points) == self._stored else 0
-            used = faces >= 0
-            self.mesh.CreateFaceVertexCountsAttr().Set(Vt.IntArray.FromNumpy(used.sum(axis=1, dtype=np.int32)), time)
-            self.mesh.CreateFaceVertexIndicesAttr().Set(Vt.IntArray.FromNumpy(faces[used]), time)
-        if self._points is None:  # after the first faces, in the order of the schema
-            self._points, self._extent = self.mesh.CreatePointsAttr(), self.mesh.CreateExtentAttr()
+            set_faces(self.mesh, faces, time)
         stored = self._padded(points)
-        self._points.Set(Vt.Vec3fArray.FromNumpy(stored), time)
-        self._extent.Set(Vt.Vec3fArray.FromNumpy(bounding_box(stored)), time)
+        set_points(self.mesh, stored, time)
         self._stored = len(stored)
 
     def write_energy(self, time: Any, density: Any, colours: NDArray[np.float32]) -> None:
@@ -454,33 +478,3 @@ def add_light(stage: Any) -> None:
     key.CreateExposureAttr(0.0)
     key.CreateAngleAttr(2.0)
     UsdGeom.Xformable(key).AddRotateXYZOp().Set(Gf.Vec3f(-35.0, -30.0, 0.0))
-
-
-def rows_on_table(sizes: FloatArray, gap: float) -> FloatArray:
-    """Return the lower left corner of each of several boxes, laid out in rows, so many that the whole is near to 16 by 9.
-
-    Args:
-        sizes: #B by 2 [m].
-        gap: between boxes and between rows [m].
-    """
-    whole = float((sizes[:, 0] + gap).sum())
-    layouts = [_rows(sizes, gap, max(1.05 * whole / rows, float(sizes[:, 0].max()))) for rows in range(1, 5)]
-
-    def unlikeness(corners: FloatArray) -> float:
-        wide, high = (corners + sizes).max(axis=0)
-        return abs(math.log(max(wide, 1e-9) / max(high, 1e-9) * 9.0 / 16.0))
-
-    return min(layouts, key=unlikeness)
-
-
-def _rows(sizes: FloatArray, gap: float, width: float) -> FloatArray:
-    """Return the lower left corners of boxes in rows of at most this width [m]."""
-    corners = np.zeros_like(sizes)
-    x = y = deep = 0.0
-    for number, (wide, high) in enumerate(sizes.tolist()):
-        if x > 0.0 and x + wide > width:
-            x, y, deep = 0.0, y - deep - gap, 0.0
-        corners[number] = x, y - high
-        x, deep = x + wide + gap, max(deep, high)
-    corners[:, 1] -= corners[:, 1].min()
-    return corners

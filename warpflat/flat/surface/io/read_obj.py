@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.flat.surface.connectivity import join_labels
+from warpflat.flat.surface.connectivity import chain_lines, join_labels
 from warpflat.flat.surface.io.usd_stage import numbered
 from warpflat.flat.surface.repair.polygons import pad_corners
 
-__all__ = ["ObjMesh", "chain_lines", "read_obj"]
+__all__ = ["ObjMesh", "read_obj"]
 
 _CONTINUED, _JOINT = re.compile(r"^(?:[^\n]*\\ *\r?\n)+[^\n]*", re.MULTILINE), re.compile(r"\\ *\r?\n")
 _AFTER_SLASH = re.compile(r"/\S*")
@@ -244,28 +244,3 @@ def _line_elements(rows: list[tuple[str, str, int, int]], total: int) -> dict[st
             )
         elements.setdefault(group or "line", []).append(path)
     return {name: chain_lines(chains) for name, chains in elements.items()}
-
-
-def chain_lines(parts: list[list[int]]) -> list[list[int]]:
-    """Join chains end to end where exactly two ends meet, since some exporters write every edge by itself."""
-    ends: dict[int, list[int]] = {}
-    for number, part in enumerate(parts):
-        for vertex in {part[0], part[-1]}:
-            ends.setdefault(vertex, []).append(number)
-    left = dict(enumerate(parts))
-    chains = []
-    for number in range(len(parts)):
-        if number not in left:
-            continue
-        joined = list(left.pop(number))
-        for _ in range(2):
-            while joined[0] != joined[-1]:
-                meeting = ends.get(joined[-1], [])
-                follow = [n for n in meeting if n in left]
-                if len(meeting) != 2 or not follow:
-                    break
-                part = left.pop(follow[0])
-                joined += (part if part[0] == joined[-1] else part[::-1])[1:]
-            joined.reverse()
-        chains.append(joined)
-    return chains
