@@ -197,25 +197,25 @@ def part_solids(
         for mesh in meshes:
             area = float(cloth.face_areas[mesh.face_of].sum())
             key = _key(mesh, area)
-            large, flat, strain = shape and area > _LEAST * total, None, _strain(mesh, known)
-            left = min(strain, 1.0) * area
+            large, flat = shape and area > _LEAST * total, None
             # What has no pattern, or one that nobody can sew, comes first and last; how many pieces there are is no matter.
             if not is_open(mesh) or _is_sewn_inside(cloth, mesh):
-                rank = 2
+                rank, value = 2, _strain(mesh, known) * area
             elif laid is not None and _is_disk(mesh):
                 flat = laid(cloth, mesh)
-                left = flat.crushed * area
                 beyond += flat.outside * area
-                rank = 2 if flat.overlap > _OVERLAP else int(flat.outside * area > _WORTH * total)
+                rank, value = (
+                    (2, flat.overlap) if flat.overlap > _OVERLAP else (1, flat.outside * area - _WORTH * total)
+                )
             else:
-                rank = int(strain > _FLAT)
-                beyond += rank * area
-            if rank == 1 and (not large or len(meshes) >= most or (1, key) in done):
+                rank, value = 1, (_strain(mesh, known) - _FLAT) * area
+                beyond += area if value > 0.0 else 0.0
+            if rank == 1 and (not large or len(meshes) >= most or value <= 0.0 or (1, key) in done):
                 rank = 0
             if rank == 0 and (not large or flat is None or flat.neck is None):
                 continue
             if (rank, key) not in done:
-                waiting.append((rank, left, key, mesh))
+                waiting.append((rank, value, key, mesh))
         if beyond < _ENOUGH * total:
             waiting = [one for one in waiting if one[0] != 1]
         if not waiting:
@@ -528,9 +528,7 @@ def _best_way(
         if laid is not None:
             disks = [laid(made, part) for part in made.pieces() if _is_disk(part)]
             # The more of a part is crushed, the less its pattern tells of its width.
-            narrow = [
-                flat.crushed + (1.0 - flat.crushed) * (1.0 - flat.width / (NARROW * np.sqrt(total))) for flat in disks
-            ]
+            narrow = [(1.0 - flat.crushed) * (1.0 - flat.width / (NARROW * np.sqrt(total))) for flat in disks]
             cost += _THIN * max(narrow, default=0.0)
         if best is None or cost < best[0]:
             best = cost, field
