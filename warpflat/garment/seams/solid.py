@@ -461,6 +461,8 @@ def _ways(mesh: PieceMesh, mirror: Anatomy | None) -> Iterator[_Way]:
         k = int(np.abs(axes @ mirror.normal).argmax())
         if abs(float(axes[k] @ mirror.normal)) > _NEARLY:
             axes[k], fields[:, k] = mirror.normal, mesh.vertices @ mirror.normal - mirror.offset
+    # To the nanometre: on which side a vertex in the plane of symmetry lies is not for rounding to say.
+    fields = np.round(fields, 9)
     for k in (1, 2, 0):
         yield _Way(field=fields[:, k], name="across", round=bool(same.any()))
     _, normals = _smoothed_normals(mesh)
