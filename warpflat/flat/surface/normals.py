@@ -36,7 +36,7 @@ def vertex_normals(positions: FloatArray, faces: NDArray[np.integer]) -> FloatAr
 def mean_normals(vectors: FloatArray, faces: NDArray[np.integer], count: int) -> FloatArray:
     """Return the unit normals of `count` vertices, as `vertex_normals` does, by area vectors (#F by 3)."""
     corners, each = faces.T.ravel(), faces.shape[1]
-    total = np.column_stack([np.bincount(corners, np.tile(axis, each), count) for axis in vectors.T])
+    total: FloatArray = np.column_stack([np.bincount(corners, np.tile(axis, each), count) for axis in vectors.T])
     areas = np.bincount(corners, np.tile(np.linalg.norm(vectors, axis=1), each), count)
     # Faces that lie on each other, as a mouth's lining, cancel but for rounding.
     total[np.linalg.norm(total, axis=1) < _CANCEL * areas] = 0.0
