@@ -70,6 +70,11 @@ class Energy:
         """Measure in the arrays of a state, whose layout follows."""
         self.state, self._barrier = state, barrier
 
+    @property
+    def has_contact(self) -> bool:
+        """Whether there is a barrier of contact."""
+        return self._barrier is not None
+
     def at(self, positions: FloatArray) -> Point:
         """Evaluate a layout (#V by 2 [m])."""
         # The cloth is not evaluated where the border crosses itself.

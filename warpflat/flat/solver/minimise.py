@@ -93,7 +93,9 @@ class Cloth:
         self._due *= _LATER
         if point.energy < (1.0 - _CHANGED) * self._energy_factored:
             self._energy_factored = point.energy
-            own = StiffnessFactor(state.network, point.positions, state.alignments, dtype=np.float32)
+            # Contacts are a million times as stiff as cloth: Woodbury's differences of the inverse would be lost in single precision.
+            precision = np.float64 if self.energy.has_contact else np.float32
+            own = StiffnessFactor(state.network, point.positions, state.alignments, dtype=precision)
             self.metric = Metric(own, state.alignments)
             descent.renew(forget=True)
 
