@@ -108,11 +108,6 @@ class LaidFlat:
     width: float
     neck: FloatArray | None = None
 
-    @property
-    def crushed(self) -> float:
-        """The share beyond its limit, all from a half on: of cloth that is crushed, how much is beyond it hangs on rounding."""
-        return min(2.0 * self.outside, 1.0)
-
 
 #: Lays a piece of a cloth flat; the third argument is the width from which on nothing is narrow [m].
 Measure = Callable[[Cloth, PieceMesh, float], LaidFlat]
@@ -529,9 +524,9 @@ def _best_way(
             break
         if laid is not None:
             disks = [laid(made, part) for part in made.pieces() if _is_disk(part)]
-            # The more of a part is crushed, the less its pattern tells of its width.
-            narrow = [(1.0 - flat.crushed) * (1.0 - flat.width / (NARROW * np.sqrt(total))) for flat in disks]
-            cost += _THIN * max(narrow, default=0.0)
+            # What lies over itself has no width: where it is narrowest hangs on rounding.
+            widths = [flat.width for flat in disks if flat.overlap <= _OVERLAP]
+            cost += _THIN * max(1.0 - min(widths, default=np.inf) / (NARROW * np.sqrt(total)), 0.0)
         if best is None or cost < best[0]:
             best = cost, field
     return None if best is None else best[1]
