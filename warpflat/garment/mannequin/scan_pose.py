@@ -103,6 +103,11 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
     """
     options.check()
     welded, scanned, loose = _without_loose_pieces(*_welded(vertices, faces))
+    if not len(scanned):
+        raise InputError(
+            "scan: no face is left where vertices that lie at one place are joined; its places need more digits, or it lies too far from "
+            "the origin"
+        )
     scanned, turned = turned_outward(welded, scanned)
     points, triangles, holes = close_holes(welded, scanned)
     points, noise = smooth_noise(points, triangles)
@@ -194,18 +199,17 @@ def _welded(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray,
         raise InputError("scan: all its vertices lie at one point")
     if (stray := stray_vertex(vertices[used])) is not None:
         raise InputError(f"scan: {stray_words(int(used[stray]), vertices[used[stray]])}")
-    _, first, inverse = np.unique(
-        np.round(vertices / (1e-6 * span)).astype(np.int64), axis=0, return_index=True, return_inverse=True
-    )
-    triangles = np.ravel(inverse)[triangles]
+    grid = np.round((vertices[used] - vertices[used].min(axis=0)) / (1e-6 * span)).astype(np.int64)
+    _, first, inverse = np.unique(grid, axis=0, return_index=True, return_inverse=True)
+    triangles = np.ravel(inverse)[np.searchsorted(used, triangles)]
     solid = (
         (triangles[:, 0] != triangles[:, 1])
         & (triangles[:, 1] != triangles[:, 2])
         & (triangles[:, 2] != triangles[:, 0])
     )
     triangles = triangles[solid]
-    used, local = np.unique(triangles, return_inverse=True)
-    return vertices[first[used]].astype(float), np.ravel(local).reshape(-1, 3).astype(np.int64)
+    kept, local = np.unique(triangles, return_inverse=True)
+    return vertices[used[first[kept]]].astype(float), np.ravel(local).reshape(-1, 3).astype(np.int64)
 
 
 def _without_loose_pieces(

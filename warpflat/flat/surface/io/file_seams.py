@@ -276,12 +276,13 @@ def _texture_areas(texture: FloatArray, polygons: Ids) -> FloatArray:
     size = (polygons >= 0).sum(axis=1)
     column = np.arange(polygons.shape[1])
     follow = np.where(column[None, :] + 1 < size[:, None], column[None, :] + 1, 0)
-    points = np.where(real, texture - texture[:, :1], 0.0)
-    x, y = points.transpose(2, 0, 1)
-    nx, ny = np.take_along_axis(x, follow, axis=1), np.take_along_axis(y, follow, axis=1)
-    return np.nan_to_num(
-        0.5 * np.where(real[..., 0], x * ny - nx * y, 0.0).sum(axis=1), nan=0.0, posinf=0.0, neginf=0.0
-    )
+    # What is beyond all numbers has no area.
+    with np.errstate(over="ignore", invalid="ignore"):
+        points = np.where(real, texture - texture[:, :1], 0.0)
+        x, y = points.transpose(2, 0, 1)
+        nx, ny = np.take_along_axis(x, follow, axis=1), np.take_along_axis(y, follow, axis=1)
+        area = 0.5 * np.where(real[..., 0], x * ny - nx * y, 0.0).sum(axis=1)
+    return np.nan_to_num(area, nan=0.0, posinf=0.0, neginf=0.0)
 
 
 def _has_simple_outline(texture: FloatArray, polygons: Ids) -> bool:
