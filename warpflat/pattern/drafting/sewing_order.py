@@ -344,8 +344,9 @@ class _Workshop(SewingTasks):
         waits = {task: sum(task in other.needs for other in self.tasks if other.seams) for task in self.tasks}
 
         def key(task: Task) -> tuple[object, ...]:
+            # To a tenth of a millimetre: seams of one length are sewn in the pattern's order, whatever the rounding.
             length = self.lengths.get(task.seams[0].name, (0.0, 0.0))[0] if task.seams else 0.0
-            return (*shape(task), -waits[task], length, number[task])
+            return (*shape(task), -waits[task], round(length, 1), number[task])
 
         while ready:
             first = min(ready, key=key)
