@@ -101,6 +101,7 @@ from .text import plain_letters as plain_letters
 from .text import quote_value as quote_value
 from .text import size_words as size_words
 from .text import without_side as without_side
+from .threads import thread_count as thread_count
 from .toml_file import Table as Table
 from .toml_file import check_table as check_table
 from .toml_file import document_as_toml as document_as_toml

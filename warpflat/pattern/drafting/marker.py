@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, nearest, size_words
+from warpflat.core import FloatArray, InputError, nearest, size_words, thread_count
 from warpflat.pattern.drafting.cut_list import cloths_of
 from warpflat.pattern.drafting.drafted import DraftedEdge, DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.label import Label, printed_size
@@ -255,7 +255,10 @@ def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seco
         items.append(spyrrow.Item(str(index), [(x * 1000, y * 1000) for x, y in corners.tolist()], 1, angles))
     instance = spyrrow.StripPackingInstance(name, usable * 1000, items)
     config = spyrrow.StripPackingConfig(
-        total_computation_time=seconds, num_workers=1, seed=seed, min_items_separation=cloth.gap * 1000 or None
+        total_computation_time=seconds,
+        num_workers=thread_count(),
+        seed=seed,
+        min_items_separation=cloth.gap * 1000 or None,
     )
     placements = []
     try:
