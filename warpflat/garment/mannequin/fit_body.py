@@ -15,7 +15,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.core import FloatArray, launch_quietly
+from warpflat.core import FloatArray, launch_quietly, unit
 from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.body_landmarks import PLACES, height_weights
 from warpflat.garment.mannequin.body_model import BodyModel, Person, rotation
@@ -83,8 +83,7 @@ class Mesh:
 
         The nearest place is often on an edge, where rounding decides to which of its two triangles it belongs.
         """
-        mean = np.einsum("pk,pka->pa", weights, self._outwards[self.triangles[face]])
-        return np.asarray(mean / np.maximum(np.linalg.norm(mean, axis=1), 1e-300)[:, None])
+        return unit(np.einsum("pk,pka->pa", weights, self._outwards[self.triangles[face]]))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
