@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +17,9 @@ from warpflat.flat.surface.connectivity import border_loops, euler_characteristi
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.tubes import tube_borders
 from warpflat.garment.construction.to_pattern import pattern_of_garment
-from warpflat.garment.seams.cloth import Cloth, PieceMesh
+from warpflat.garment.seams.cloth import Cloth
 from warpflat.garment.seams.energy import _TRIAL, _can_be_sewn, _cut
-from warpflat.garment.seams.fields import Operators
+from warpflat.garment.seams.fields import TriangleMesh
 from warpflat.garment.seams.find import FoundSeams, cloth_of
 from warpflat.garment.seams.lines import Line
 from warpflat.garment.seams.measure import Measured, laid_flat
@@ -222,16 +221,12 @@ def test_a_neck_that_is_too_narrow_to_be_sewn_is_cut_through(columns: int) -> No
     cloth = cloth_of(bone(columns))
     fabric = as_fabric("woven")
     parted, _ = part_solids(
-        cloth, shape=True, measure=lambda trial, mesh, width: laid_flat(as_surface(trial, mesh), fabric, width)
+        cloth, shape=True, measure=lambda trial, mesh, width: laid_flat(mesh.as_surface(), fabric, width)
     )
     areas = [float(parted.face_areas[mesh.face_of].sum()) for mesh in parted.pieces()]
     assert len(areas) == (2 if columns == 2 else 1)
     if columns == 2:
         assert parted.seam_length("seam 1") == pytest.approx(0.004, rel=0.1)
-
-
-def as_surface(cloth: Cloth, mesh: PieceMesh) -> Surface:
-    return replace(cloth, vertices=mesh.vertices, faces=mesh.faces, values={}, labels={}, seams={}).as_surface()
 
 
 def dented(depth: float = 0.08) -> Surface:
@@ -290,11 +285,9 @@ def test_a_dart_that_all_but_parts_a_piece_is_not_made(leaves: float, fits: bool
 def laid_on_trial(cloth: Cloth) -> Measured:
     """Return the only piece of a cloth, laid flat."""
     (mesh,) = cloth.pieces()
-    surface = as_surface(cloth, mesh)
+    surface = mesh.as_surface()
     result = warpflat.flatten(surface, fabric="woven")
-    return Measured(
-        mesh=mesh, surface=surface, result=result, outside=0.0, energy=0.0, area=1.0, place=mesh.vertices.mean(axis=0)
-    )
+    return Measured(mesh=mesh, surface=surface, result=result, outside=0.0, energy=0.0, area=1.0)
 
 
 def test_who_asks_for_less_beyond_the_limit_gets_darts_that_bring_less() -> None:
@@ -328,19 +321,12 @@ def test_a_piece_within_the_limit_gets_its_darts_while_the_whole_is_beyond() -> 
     assert any(name.startswith("dart") for piece in found.pieces for name in piece.lines if piece.name == "back")
 
 
-def write(surface: Surface, path: Path) -> Path:
-    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in surface.vertices.tolist()]
-    lines += ["f " + " ".join(str(v + 1) for v in face if v >= 0) for face in surface.faces.tolist()]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path
-
-
 def test_trousers_as_tight_as_a_skin_have_darts_and_no_panel_more() -> None:
     """Cloth that shears lies around a calf and a knee: panels were needed where the threads were strained instead."""
     plain = solids.trousers(0.04)
     vertices = plain.vertices.copy()
     faces = plain.faces[:, :3].astype(np.int64)
-    normals = Operators(vertices=vertices, faces=faces).vertex_normals
+    normals = TriangleMesh(vertices=vertices, faces=faces).vertex_normals
     for side in (1, -1):
         for place in ([0.07 * side, 0.1, -0.14], [0.12 * side, -0.28, 0.07], [0.13 * side, -0.4, -0.08]):
             away = np.linalg.norm(plain.vertices - place, axis=1)
@@ -356,17 +342,8 @@ def test_trousers_as_tight_as_a_skin_have_darts_and_no_panel_more() -> None:
 
 def test_two_layers_are_worn_the_same_way_up(tmp_path: Path) -> None:
     shirt, skirt = solids.shirt(step=0.045), solids.skirt()
-    lines = []
-    count = 0
-    for surface in (shirt, skirt):
-        lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in surface.vertices.tolist()]
-        lines += ["f " + " ".join(str(v + 1 + count) for v in face if v >= 0) for face in surface.faces.tolist()]
-        count += len(surface.vertices)
-    button = trimesh.creation.icosphere(1, radius=0.005)
-    lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in button.vertices.tolist()]
-    lines += ["f " + " ".join(str(v + 1 + count) for v in face) for face in button.faces.tolist()]
-    (tmp_path / "two.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    layers = warpflat.read_layers(tmp_path / "two.obj", units="m")
+    button = surface_of(trimesh.creation.icosphere(1, radius=0.005))
+    layers = warpflat.read_layers(solids.write(tmp_path / "two.obj", shirt, skirt, button), units="m")
     assert len(layers) == 2
     assert any("small part" in note for note in layers[0].notes)
     found = warpflat.find_seams(layers)
@@ -381,13 +358,7 @@ def test_the_body_that_wears_a_shirt_is_no_layer_of_it(tmp_path: Path) -> None:
     trunk = solids.rod([0, -0.3, 0], [0, 0.6, 0], 0.15, 0.6)
     arms = [solids.rod([0, 0.5, 0], [0.6 * side, 0.5, 0], 0.045) for side in (1.0, -1.0)]
     body = solids.skin(solids.joined([trunk, *arms], 0.02), [-0.8, -0.5, -0.3], [0.8, 0.9, 0.3], 0.045)
-    lines, count = list[str](), 0
-    for surface in (body, shirt):
-        lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in surface.vertices.tolist()]
-        lines += ["f " + " ".join(str(v + 1 + count) for v in face if v >= 0) for face in surface.faces.tolist()]
-        count += len(surface.vertices)
-    (tmp_path / "worn.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    layers = warpflat.read_layers(tmp_path / "worn.obj", units="m")
+    layers = warpflat.read_layers(solids.write(tmp_path / "worn.obj", body, shirt), units="m")
     assert [len(layer.vertices) for layer in layers] == [len(shirt.vertices)]
     assert any(note.startswith("a body, ") for note in layers[0].notes)
 

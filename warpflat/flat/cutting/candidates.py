@@ -129,7 +129,7 @@ def find_candidates(result: Flattening, places: Sequence[int] | None = None) -> 
         # Two cuts that mirror each other are as long and have ends at equal distances across.
         (begin, tip), (other_begin, other_tip) = (result.surface.vertices[one.paths[0][[0, -1]]] for one in (a, b))
         across = np.linalg.norm(begin - other_tip) - np.linalg.norm(tip - other_begin)
-        lengths = [_cut_length(result.surface, one) for one in (a, b)]
+        lengths = [sum(path.length for path in one.drawn) or path_length(result.surface, one.paths) for one in (a, b)]
         alike = abs(lengths[0] - lengths[1]) <= _ALIKE * max(lengths) and abs(across) <= _ALIKE * size
         if not alike or np.isin(row, other).any():
             continue
@@ -273,7 +273,3 @@ def _last_number(result: Flattening, kind: str) -> int:
     """Return the highest number in the names of lines and cuts of a kind; 0 if there is none."""
     names = " ".join([*result.surface.lines, *(made.name for made in result.cuts)])
     return max((int(found) for found in re.findall(rf"\b{kind} (\d+)", names)), default=0)
-
-
-def _cut_length(surface: Surface, one: Candidate) -> float:
-    return sum(path.length for path in one.drawn) or path_length(surface, one.paths)

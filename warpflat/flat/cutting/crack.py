@@ -22,8 +22,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import dijkstra
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import arc_lengths
@@ -33,6 +31,7 @@ from warpflat.flat.model.strain import area_beyond, corner_strain, worn_cell_str
 from warpflat.flat.solver.metric import StiffnessFactor, cell_forces, cell_stiffness
 from warpflat.flat.surface.connectivity import border_of, join_labels
 from warpflat.flat.surface.half_edges import half_edges_of, opposite_half_edges
+from warpflat.flat.surface.paths.edge_paths import EdgeGraph
 
 __all__ = ["ElasticCrack", "LaidCloth", "Parted", "Price"]
 
@@ -156,14 +155,8 @@ class LaidCloth:
         rim = self.border.copy()
         rim[[start, end]] = False
         cost = np.where(rim[edges].any(axis=1) | (self.half_edges.count < 2), _AT_BORDER * (cost + long.mean()), cost)
-        graph = coo_array((cost, edges.T), shape=(len(off), len(off))).tocsr()
-        _, before = dijkstra(graph, directed=False, indices=start, return_predecessors=True)
-        found = [end]
-        while found[-1] != start:
-            if before[found[-1]] < 0:
-                return None
-            found.append(int(before[found[-1]]))
-        return None if rim[found].any() else np.array(found[::-1])
+        found = EdgeGraph(self.network.surface).path(start, end, cost).astype(np.int64)
+        return None if len(found) == 0 or rim[found].any() else found
 
     def row_of(self, origin: IntArray, path: IntArray) -> Ids | None:
         """Return a path as vertices of the layout, in which cuts have doubled some; None if it touches the border on its way.

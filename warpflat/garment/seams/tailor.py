@@ -8,22 +8,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, FloatArray, reflected
-from warpflat.flat import components
-from warpflat.garment.seams.anatomy import Anatomy, Limb
-from warpflat.garment.seams.cloth import Cloth, edge_components, section
-from warpflat.garment.seams.fields import Operators
+from warpflat.core import BoolArray, FloatArray, reflected, unit
+from warpflat.flat import border_loops, components
+from warpflat.garment.seams.anatomy import FROM_SHOULDERS, Anatomy, Limb
+from warpflat.garment.seams.cloth import ISLAND, Cloth, edge_components, section
 
 __all__ = [
     "BESIDE",
     "FACING",
     "LEFT",
-    "TAILORED",
     "Fields",
+    "centre_lines",
     "cut_as_a_tailor",
     "draw_fields",
     "side_word",
-    "tidied",
     "with_drawn_sleeves",
 ]
 
@@ -51,11 +49,7 @@ _LEVELS, _WIDER, _ROOT, _SHOULDERS, _HOOD, _FACE = 25, 1.1, 1.35, 1.5, (0.05, 0.
 BESIDE = 0.08
 # A sleeve has no more than this share of the neck, or of the opening.
 _NECK = 0.35
-# An island of the other sign of less than this share of its part is a wrinkle.
-_ISLAND = 0.06
 
-#: Kinds of garments that a tailor knows how to cut.
-TAILORED = ("top", "dress", "skirt", "trousers", "jumpsuit")
 #: The field that is positive in front, the one that is positive on the left, and those that are positive in a sleeve.
 FACING, LEFT = "front", "left"
 
@@ -78,27 +72,24 @@ def side_word(side: float) -> str:
     return "left" if side > 0 else "right"
 
 
-def draw_fields(cloth: Cloth, anatomy: Anatomy, operators: Operators) -> Fields:
+def draw_fields(cloth: Cloth, anatomy: Anatomy) -> Fields:
     """Draw the fields whose zero lines are seams, symmetric where the garment is."""
     size, mirror = anatomy.size, anatomy.mirror
-    normal = operators.smooth(operators.vertex_normals, _SMOOTH * size)
+    normal = cloth.smooth(cloth.vertex_normals, _SMOOTH * size)
     facing = normal @ anatomy.front / np.maximum(np.linalg.norm(normal, axis=1), 1e-3)
     armholes = _armhole_fields(cloth, anatomy)
-    facing = _around_limbs(facing, cloth, anatomy, operators, armholes)
-    lateral = cloth.vertices @ anatomy.normal - anatomy.offset
-    sides = {side: [limb for limb in anatomy.borders if limb.side == side] for side in (1, -1)}
-    left = lateral
-    if sides[1] and sides[-1]:
-        fixed = {side: np.concatenate([border.vertices for border in sides[side]]) for side in (1, -1)}
-        given = np.concatenate([np.full(len(fixed[1]), 1.0), np.full(len(fixed[-1]), -1.0)])
-        left = operators.solve(np.concatenate([fixed[1], fixed[-1]]), given)
+    facing = _around_limbs(facing, cloth, anatomy, armholes)
+    left = anatomy.across(cloth.vertices)
+    beside = [border for border in anatomy.borders if border.side]
+    if {border.side for border in beside} == {1, -1}:
+        given = np.concatenate([np.full(len(border.vertices), float(border.side)) for border in beside])
+        left = cloth.solve(np.concatenate([border.vertices for border in beside]), given)
         left = left if mirror is None else mirror.symmetrised(left, -1.0)
     # The cloth at the centre lines is wholly in front, or wholly behind.
-
     changes = (left[cloth.faces].min(axis=1) < 0.0) & (left[cloth.faces].max(axis=1) >= 0.0)
     centre = np.unique(cloth.faces[changes])
     centre = centre[np.abs(facing[centre]) > _FACES]
-    front = operators.solve(centre, np.sign(facing[centre]), data=facing, length=_SCREEN * size)
+    front = cloth.solve(centre, np.sign(facing[centre]), data=facing, length=_SCREEN * size)
     front = front if mirror is None else mirror.symmetrised(front)
     values = {**cloth.values, FACING: front, LEFT: left}
     sleeves = {}
@@ -109,9 +100,7 @@ def draw_fields(cloth: Cloth, anatomy: Anatomy, operators: Operators) -> Fields:
     return Fields(cloth=replace(cloth, values=values), sleeves=sleeves)
 
 
-def _around_limbs(
-    facing: FloatArray, cloth: Cloth, anatomy: Anatomy, operators: Operators, armholes: Mapping[int, FloatArray]
-) -> FloatArray:
+def _around_limbs(facing: FloatArray, cloth: Cloth, anatomy: Anatomy, armholes: Mapping[int, FloatArray]) -> FloatArray:
     """Return how far vertices face to the front; along sleeves and legs by their place around the axis, which wrinkles do not turn."""
     made = facing.copy()
     sleeves = anatomy.limbs_of("sleeve")
@@ -119,17 +108,15 @@ def _around_limbs(
     regions += [(limb, (limb.fork - cloth.vertices) @ anatomy.up) for limb in anatomy.limbs_of("leg")]
     for limb, beyond in regions:
         rim = anatomy.borders[limb.border].vertices
-        own = _reached(cloth.faces, beyond > 0.0, rim)
+        own = cloth.reached(beyond > 0.0, rim)
         others = np.flatnonzero(~own)
         if len(others) == 0 or own.sum() < 30:
             continue
-        along = operators.solve(
-            np.concatenate([rim, others]), np.concatenate([np.ones(len(rim)), np.zeros(len(others))])
-        )
+        along = cloth.solve(np.concatenate([rim, others]), np.concatenate([np.ones(len(rim)), np.zeros(len(others))]))
         # The middle of each of some rings, as a smooth curve.
         count = int(np.clip(own.sum() // 40, 4, 24))
         order = np.flatnonzero(own)[np.argsort(along[own], kind="stable")]
-        mass = operators.mass[order]
+        mass = cloth.mass[order]
         ring = np.minimum((np.cumsum(mass) / mass.sum() * count).astype(np.int64), count - 1)
         total = np.maximum(np.bincount(ring, mass, minlength=count), 1e-300)
         at = np.bincount(ring, mass * along[order], minlength=count) / total
@@ -140,13 +127,11 @@ def _around_limbs(
         curve = np.polynomial.polynomial.polyfit(at, middle, degree)
         tangent = np.polynomial.polynomial.polyder(curve)
         t = np.clip(along[own], at.min(), at.max())
-        way = np.polynomial.polynomial.polyval(t, tangent).T
-        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
+        way = unit(np.asarray(np.polynomial.polynomial.polyval(t, tangent).T, dtype=np.float64))
         off = cloth.vertices[own] - np.polynomial.polynomial.polyval(t, curve).T
         off -= np.einsum("ij,ij->i", off, way)[:, None] * way
-        place = off @ anatomy.front / np.maximum(np.linalg.norm(off, axis=1), 1e-300)
         weight = np.clip(4.0 * along[own], 0.0, 1.0)
-        made[own] = (1.0 - weight) * facing[own] + weight * place
+        made[own] = (1.0 - weight) * facing[own] + weight * (unit(off) @ anatomy.front)
     return made
 
 
@@ -172,7 +157,8 @@ def _armhole_fields(cloth: Cloth, anatomy: Anatomy) -> dict[int, FloatArray]:
                 break
             along = way / np.linalg.norm(way)
     for number, limb in enumerate(limbs):
-        mate = next((k for k, other in enumerate(limbs) if other.side == -limb.side), None)
+        other_limb = anatomy.mate(limb)
+        mate = None if other_limb is None else limbs.index(other_limb)
         if limb.side > 0 and mate is not None and {number, mate} <= found.keys() and anatomy.mirror is not None:
             # Both planes become the mean of one and the mirror image of the other, if these are much the same.
             (one, at), (other, there) = found[number], found[mate]
@@ -194,14 +180,13 @@ def _facing_of_armhole(anatomy: Anatomy, limb: Limb, along: FloatArray) -> Float
     It turns forwards with an arm as far as that is raised: a shoulder does. A sleeve that hangs is set forwards in its armhole.
     """
     outwards, up = limb.side * anatomy.normal, anatomy.up
-    outwards = outwards - (outwards @ up) * up
-    outwards /= np.linalg.norm(outwards)
+    outwards = unit(outwards - (outwards @ up) * up)
     half = outwards + along
     rise = np.clip(np.arctan2(half @ up, max(float(half @ outwards), 1e-3)), _HANGS, _RAISED)
     level = half - (half @ up) * up
     level -= (1.0 - max(rise / _RAISED, 0.0)) * (level - (level @ outwards) * outwards)
     angle = rise - _LEAN
-    return np.asarray(np.cos(angle) * level / max(float(np.linalg.norm(level)), 1e-300) + np.sin(angle) * up)
+    return np.asarray(np.cos(angle) * unit(level) + np.sin(angle) * up)
 
 
 def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> tuple[float, FloatArray] | None:
@@ -213,7 +198,7 @@ def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> 
     bare: tuple[float, FloatArray] | None = None
     for number in range(60):
         offset = _OUTSIDE * anatomy.size + number * step
-        beyond = _reached(cloth.faces, height > offset, rim)
+        beyond = cloth.reached(height > offset, rim)
         if offset >= height[rim].min():
             break
         shares = [float(beyond[border.vertices].mean()) for border in others]
@@ -252,23 +237,19 @@ def cut_as_a_tailor(fields: Fields, anatomy: Anatomy, *, hood: bool = True) -> t
         else:
             cloth = cut
     cloth = _cut_hood(cloth, anatomy) if hood else cloth
-    kind = anatomy.kind
-    if kind in ("trousers", "jumpsuit"):
-        everywhere = cloth.labels["sleeve"] < 0
-        cloth = tidied(cloth, LEFT, everywhere)
-        cloth, is_left = cloth.split(LEFT, cloth.labels["sleeve"] < 0)
-        edges = cloth.line_between(is_left, cloth.labels["sleeve"] < 0)
-        ahead = cloth.values[FACING][edges].mean(axis=1) > 0.0
-        for name, chosen in (("centre front", ahead), ("centre back", ~ahead)):
-            if chosen.any():
-                cloth = cloth.with_seam(name, edges[chosen])
-    cloth = tidied(cloth, FACING, cloth.labels["sleeve"] < 0)
-    for number in range(len(fields.sleeves)):
-        cloth = tidied(cloth, FACING, cloth.labels["sleeve"] == number)
-    cloth, ahead = cloth.split(FACING, np.ones(len(cloth.faces), dtype=bool))
+    if anatomy.kind in ("trousers", "jumpsuit"):
+        cloth, centre = centre_lines(cloth)
+        for name, edges in centre.items():
+            if len(edges):
+                cloth = cloth.with_seam(name, edges)
+    for number in range(-1, len(fields.sleeves)):
+        cloth = cloth.without_islands(FACING, cloth.labels["sleeve"] == number)
+    cloth, ahead, _ = cloth.split(FACING, np.ones(len(cloth.faces), dtype=bool))
     trunk = cloth.labels["sleeve"] < 0
     armpits = [float(limb.fork @ anatomy.up) for limb in fields.sleeves.values()]
-    upper = _upper(anatomy)
+    # Above the middle of the armholes a line is a shoulder where there are no sleeves.
+    bare = [float(border.middle @ anatomy.up) for border in anatomy.borders if border.role == "sleeve"]
+    upper = float(np.mean(bare)) if bare else np.inf
     crotch = next((limb.fork for limb in anatomy.limbs_of("leg")), None)
     lines = cloth.line_between(ahead, trunk)
     on_left = cloth.values[LEFT][lines].mean(axis=1) > 0.0
@@ -301,6 +282,13 @@ def cut_as_a_tailor(fields: Fields, anatomy: Anatomy, *, hood: bool = True) -> t
     return cloth, notes
 
 
+def centre_lines(cloth: Cloth) -> tuple[Cloth, dict[str, Ids]]:
+    """Return the cloth split between left and right of the trunk, and the edges of the lines in front and behind by name."""
+    cloth, _, _, edges = cloth.parted(LEFT, cloth.labels["sleeve"] < 0)
+    ahead = cloth.values[FACING][edges].mean(axis=1) > 0.0
+    return cloth, {"centre front": edges[ahead], "centre back": edges[~ahead]}
+
+
 def with_drawn_sleeves(fields: Fields, anatomy: Anatomy, *, anywhere: bool = False) -> Cloth:
     """Return the cloth with the label "sleeve": the number of the sleeve that seams have cut off already, or -1.
 
@@ -316,7 +304,7 @@ def with_drawn_sleeves(fields: Fields, anatomy: Anatomy, *, anywhere: bool = Fal
         rim = anatomy.borders[limb.border].vertices
         if anywhere:
             # Parts that lie outside of the armhole, most of them: a cuff does, and the sleeve above it.
-            beyond = _reached(cloth.faces, cloth.values[name] > 0.0, rim)[cloth.faces].mean(axis=1) * cloth.face_areas
+            beyond = cloth.reached(cloth.values[name] > 0.0, rim)[cloth.faces].mean(axis=1) * cloth.face_areas
             own = (np.bincount(part, beyond) > 0.5 * whole)[part]
         else:
             own = np.isin(part, part[np.isin(cloth.faces, rim).any(axis=1)])
@@ -329,36 +317,24 @@ def with_drawn_sleeves(fields: Fields, anatomy: Anatomy, *, anywhere: bool = Fal
     return replace(cloth, labels={**cloth.labels, "sleeve": label})
 
 
-def _upper(anatomy: Anatomy) -> float:
-    """Return the height above which a line is a shoulder where there are no sleeves: the middle of the armholes."""
-    own = [border.middle @ anatomy.up for border in anatomy.borders if border.role == "sleeve"]
-    return float(np.mean(own)) if own else float("inf")
-
-
 def _cut_armhole(cloth: Cloth, anatomy: Anatomy, name: str, limb: Limb, number: int) -> Cloth | None:
     """Return the cloth with an armhole cut: the first line outside of the armpit that closes around the sleeve; None if none does."""
     rim = anatomy.borders[limb.border].vertices
     base = cloth.values[name]
     for step in range(_STEPS):
-        field = base - 0.006 * step * anatomy.size
-        trial = replace(cloth, values={**cloth.values, name: field})
-        trial = tidied(trial, name, np.ones(len(trial.faces), dtype=bool), keep=_ISLAND / 20)
+        everywhere = np.ones(len(cloth.faces), dtype=bool)
+        trial = cloth.with_values(**{name: base - 0.006 * step * anatomy.size})
+        trial = trial.without_islands(name, everywhere, keep=ISLAND / 20)
         # Only the part beyond the line that holds the sleeve's end is the sleeve.
-        beyond = trial.values[name] > 0.0
-        part = _reached(trial.faces, beyond, rim)
+        part = trial.reached(trial.values[name] > 0.0, rim)
         if not part[rim].all():
             continue
-        within = np.asarray(part[trial.faces].any(axis=1))
-        trial, positive = trial.split(name, within)
-        grown = np.zeros(len(trial.vertices), dtype=bool)
-        grown[: len(part)] = part
+        trial, positive, _ = trial.split(name, np.asarray(part[trial.faces].any(axis=1)))
+        grown = np.append(part, np.zeros(len(trial.vertices) - len(part), dtype=bool))
         sleeve = positive & grown[trial.faces].any(axis=1)
-        loops = trial.borders(sleeve)
-        if len(loops) != 2:
+        if len(border_loops(trial.faces[sleeve].astype(np.int32))) != 2:
             continue
-        labels = dict(trial.labels)
-        labels["sleeve"] = np.where(sleeve, number, labels["sleeve"])
-        trial = replace(trial, labels=labels)
+        trial = trial.with_labels(sleeve=np.where(sleeve, number, trial.labels["sleeve"]))
         edges = trial.line_between(sleeve, np.ones(len(trial.faces), dtype=bool))
         return trial.with_seam(f"armhole {side_word(limb.side)}", edges)
     return None
@@ -371,7 +347,7 @@ def _cut_hood(cloth: Cloth, anatomy: Anatomy) -> Cloth:
     nape. Its faces have the label "sleeve" behind the last sleeve: lines of the trunk do not run in it.
     """
     opening = anatomy.border("neck") or anatomy.border("opening")
-    if opening is None or anatomy.kind not in ("top", "dress", "jumpsuit"):
+    if opening is None or anatomy.kind not in FROM_SHOULDERS:
         return cloth
     trunk = cloth.labels["sleeve"] < 0
     heights, ahead = cloth.vertices @ anatomy.up, cloth.vertices @ anatomy.front
@@ -405,19 +381,15 @@ def _cut_hood(cloth: Cloth, anatomy: Anatomy) -> Cloth:
     rise, depth = float(rim.min()) + 0.01 * anatomy.size - level, float(ahead[low] - ahead[nape])
     slope = rise / depth if depth > 0.0 and abs(rise) < depth else 0.0
     field = heights - level - slope * (ahead - ahead[nape])
-    trial = tidied(replace(cloth, values={**cloth.values, "hood": field}), "hood", trunk)
-    trial, beyond = trial.split("hood", trunk)
-    hood = beyond & (trial.labels["sleeve"] < 0)
+    trial, beyond, within, edges = cloth.parted(field, trunk)
+    hood = beyond & within
     share = float(trial.face_areas[hood].sum() / trial.face_areas.sum())
     if not _HOOD[0] < share < _HOOD[1] or components(trial.faces[hood].astype(np.int32)).max() > 0:
         return cloth
     number = len(anatomy.limbs_of("sleeve"))
-    trial = replace(trial, labels={**trial.labels, "sleeve": np.where(hood, number, trial.labels["sleeve"])})
-    trial = trial.with_seam("hood", trial.line_between(hood, np.ones(len(trial.faces), dtype=bool)))
-    trial = tidied(trial, LEFT, hood)
-    trial, is_left = trial.split(LEFT, hood)
-    trial = trial.with_seam("hood centre", trial.line_between(is_left, trial.labels["sleeve"] == number))
-    return replace(trial, values={key: value for key, value in trial.values.items() if key != "hood"})
+    trial = trial.with_labels(sleeve=np.where(hood, number, trial.labels["sleeve"])).with_seam("hood", edges)
+    trial, _, _, middle = trial.parted(LEFT, hood)
+    return trial.with_seam("hood centre", middle)
 
 
 def _across(loop: FloatArray, height: FloatArray) -> float:
@@ -437,54 +409,12 @@ def _open_sleeve(cloth: Cloth, ahead: BoolArray, number: int, limb: Limb, low: I
     own = cloth.labels["sleeve"] == number
     name = f"underarm {side_word(limb.side)}"
     armhole = np.intersect1d(cloth.faces[own], cloth.faces[~own])
-    rim_edges = cloth.half_edges
-    border = np.unique(rim_edges.edges[rim_edges.count == 1])
     for part in edge_components(cloth.line_between(ahead, own)):
         touches = np.unique(part)
-        if np.isin(touches, armhole).any() and np.isin(touches, low).any() and np.isin(touches, border).any():
+        if (
+            np.isin(touches, armhole).any()
+            and np.isin(touches, low).any()
+            and np.isin(touches, cloth.border_edges).any()
+        ):
             return cloth.with_seam(name, part)
     return cloth
-
-
-def _reached(faces: Ids, allowed: BoolArray, seeds: Ids) -> BoolArray:
-    """Return #V, the vertices that are reached from seeds along edges between allowed ones."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    a, b = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    passable = allowed[a] & allowed[b]
-    graph = coo_array((np.ones(passable.sum()), (a[passable], b[passable])), shape=(len(allowed),) * 2)
-    _, label = connected_components(graph, directed=False)
-    found = np.isin(label, label[seeds[allowed[seeds]]]) & allowed
-    return np.asarray(found)
-
-
-def tidied(cloth: Cloth, level: str, within: BoolArray, *, keep: float = _ISLAND) -> Cloth:
-    """Return the cloth with islands of the other sign removed from a field: parts of a few per cent of what they lie in.
-
-    Args:
-        cloth: with the field.
-        level: its name.
-        within: #F, the faces in which islands are looked for.
-        keep: share of the area from which a part is no island.
-    """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    f, faces = cloth.values[level], cloth.faces[within]
-    if len(faces) == 0:
-        return cloth
-    mass = np.bincount(faces.ravel(), np.repeat(cloth.face_areas[within], 3), minlength=len(f)) / 3.0
-    used = mass > 0.0
-    a, b = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    same = (f[a] > 0.0) == (f[b] > 0.0)
-    graph = coo_array((np.ones(same.sum()), (a[same], b[same])), shape=(len(f),) * 2)
-    _, label = connected_components(graph, directed=False)
-    area = np.bincount(label, mass)
-    small = used & (area[label] < keep * mass.sum())
-    if not small.any():
-        return cloth
-    scale = 1e-2 * float(np.abs(f[used]).max())
-    made = f.copy()
-    made[small] = np.where(f[small] > 0.0, -1.0, 1.0) * np.minimum(np.abs(f[small]), scale)
-    return replace(cloth, values={**cloth.values, level: made})
