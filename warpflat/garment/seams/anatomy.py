@@ -17,13 +17,15 @@ from scipy.sparse.csgraph import dijkstra
 
 from warpflat.core import FloatArray, points_at_lengths, polyline_length, reflected, unit
 from warpflat.flat import components
-from warpflat.garment.seams.cloth import Cloth, section
+from warpflat.garment.seams.cloth import FACES, SAME_WAY, Cloth, section
 from warpflat.garment.seams.fields import MirrorMap, mirror_map
 
 __all__ = [
     "AXES",
+    "END",
     "FROM_SHOULDERS",
     "HOLE",
+    "RING",
     "ROLES",
     "TAILORED",
     "Anatomy",
@@ -63,16 +65,14 @@ _OPEN = 0.6
 _SHORTEST_SLEEVE = 0.05
 # The way along sleeve and side bends at the armpit by at least this [cosine of the angle between both].
 _STRAIGHT = np.cos(np.radians(160.0))
-# Two limbs are the same, mirrored, if their directions are within this angle [cosine].
-_SAME_WAY = np.cos(np.radians(20.0))
 # Nothing that is worn around the trunk, and no head's opening, is narrower [m]; no sleeve is wider.
 _SLIMMEST = 0.55
 # What is narrower below its upper end by this share is no skirt; if it goes on below its waist by this [m], it is a dress.
 _WAISTED, _BELOW_WAIST = 0.93, 0.3
 # A waist is no longer than the cloth below it is wide by this; what goes on farther below an armhole, or a neck, than this is a dress [m].
 _WAVES, _LONG = 1.25, 0.8
-# Around a neck that is no longer [m], this upper share of a poncho lies level by this (mean cosine).
-_NECKS, _SHOULDERS, _LIES = 0.62, 0.35, 0.5
+# Around a neck that is no longer [m], this upper share of a poncho faces up in the mean.
+_NECKS, _SHOULDERS = 0.62, 0.35
 # The trunk of a newborn is so long, and so far around its widest opening [m]. What is shorter than the third ends at the thigh, where a
 # leg's girth is this share of the waist's.
 _LEAST_BODY, _TO_THE_THIGH, _THIGH = (0.12, 0.28), 0.3, 0.35
@@ -80,13 +80,15 @@ _LEAST_BODY, _TO_THE_THIGH, _THIGH = (0.12, 0.28), 0.3, 0.35
 _HEADS, _HANDS, _FLAT_HAND = (0.38, 0.75), (0.1, 0.45), 0.65
 # A hem slants if it spans this share of the height, and the cloth above it, at least the second share of all, tells left from right.
 _SLANT, _ENOUGH_ABOVE = 0.15, 0.2
-# A front opening's area vector is less than this of a ring's; a hem's lies along the height by this cosine; cloth that goes on from all its
+#: A border is a ring if its area vector is at least this of a circle's; an opening in front is none.
+RING = 0.6
+# Cloth that goes on from all its
 # hems as a tube widened by more than this is a ball's with holes (a top's hem or sleeve .9 to 1.12, a ball's from 1.2 on).
-_RING, _DOWN, _TUBE = 0.6, 0.5, 1.16
-# It is turned around if it can be worn better by this; an opening in front ends in such a share of the garment's height.
-_SURELY, _END = 0.25, 0.15
-# A garment lies on its back if the way through it is upright by this (cosine).
-_LIES_ON_BACK = 0.8
+_TUBE = 1.16
+# It is turned around if it can be worn better by this.
+_SURELY = 0.25
+#: An opening in front ends above and below in such a share of the garment's height.
+END = 0.15
 # A plane of symmetry holds if the mirror image of the cloth lies on the cloth within this (median).
 _SYMMETRIC = 0.02
 
@@ -238,7 +240,7 @@ def _wearable(cloth: Cloth, anatomy: Anatomy) -> float:
             return 0.0
         ring = cloth.vertices[np.append(opening.vertices, opening.vertices[0])]
         level = heights[opening.vertices]
-        at_end = (level > level.max() - _END * tall) if highest else (level < level.min() + _END * tall)
+        at_end = (level > level.max() - END * tall) if highest else (level < level.min() + END * tall)
         return float(np.linalg.norm(np.diff(ring, axis=0), axis=1)[at_end].sum())
 
     if anatomy.kind not in TAILORED:
@@ -366,10 +368,10 @@ def _upward(loops: Sequence[Border], vertices: FloatArray) -> FloatArray:
         return AXES["+y"]
     level = np.sum([one.length * np.abs(one.normal) for one in loops], axis=0)
     longest = max(loops, key=lambda one: one.length)
-    if np.linalg.norm(longest.normal) < _RING and longest.length > 0.5 * sum(one.length for one in loops):
+    if np.linalg.norm(longest.normal) < RING and longest.length > 0.5 * sum(one.length for one in loops):
         # The thinnest way through it is from back to front.
         through = np.linalg.eigh(np.cov(vertices.T))[1][:, 0]
-        return AXES["+z"] if abs(through[1]) > _LIES_ON_BACK else AXES["+y"]
+        return AXES["+z"] if np.abs(through).argmax() == 1 else AXES["+y"]
     return AXES["+z"] if level[2] > 2.0 * level[1] and level[2] > level[0] else AXES["+y"]
 
 
@@ -496,7 +498,7 @@ def _kind(cloth: Cloth, borders: Sequence[Border], upward: FloatArray) -> tuple[
     if tall < _LEAST_BODY[0] or (len(limbs) < 4 and girth < _LEAST_BODY[1]):
         limbs = []
     # An opening from top to bottom is no ring.
-    open_front = bool(limbs) and any(span(one) > _OPEN and np.linalg.norm(one.normal) < _RING for one in middles)
+    open_front = bool(limbs) and any(span(one) > _OPEN and np.linalg.norm(one.normal) < RING for one in middles)
     roles = dict.fromkeys(middles, "border")
     kind: Kind = "other" if middles else "closed"
     if len(limbs) >= 4:
@@ -516,7 +518,7 @@ def _kind(cloth: Cloth, borders: Sequence[Border], upward: FloatArray) -> tuple[
         else:
             roles[middles[0]], roles[middles[-1]] = "hem", "neck"
         if (hem := next((border for border in middles if roles[border] == "hem"), None)) is not None:
-            faces_down = abs(hem.normal @ upward) > _DOWN * np.linalg.norm(hem.normal)
+            faces_down = abs(hem.normal @ upward) > FACES * np.linalg.norm(hem.normal)
             if not (faces_down and min(_widening(cloth, border) for border in (hem, *limbs)) < _TUBE):
                 # A ball with holes.
                 kind, roles = "other", dict.fromkeys((*middles, *limbs), "border")
@@ -585,7 +587,7 @@ def _around_the_trunk(cloth: Cloth, upper: Border, low: float, upward: FloatArra
     near = heights[cloth.faces].mean(axis=1) > high - _SHOULDERS * (high - low)
     area = cloth.face_areas[near]
     lies = float((np.abs(cloth.face_normals[near] @ upward) * area).sum() / max(float(area.sum()), 1e-300))
-    if upper.length < _NECKS and lies > _LIES:
+    if upper.length < _NECKS and lies > FACES:
         return "dress" if high - low > _LONG else "top"
     if girths[narrowest] > _WAISTED * girths[0]:
         return "skirt"
@@ -691,7 +693,7 @@ def averaged_limbs(anatomy: Anatomy, *, alike: bool) -> tuple[Limb, ...]:
         if mate is not None:
             along = reflected(mate.along, anatomy.normal)
             fork = anatomy.image(mate.fork)
-            near = along @ limb.along > _SAME_WAY and np.linalg.norm(fork - limb.fork) < _BESIDE * anatomy.size
+            near = along @ limb.along > SAME_WAY and np.linalg.norm(fork - limb.fork) < _BESIDE * anatomy.size
             if alike or near:
                 length = 0.5 * (limb.length + mate.length)
                 limb = replace(limb, along=unit(along + limb.along), fork=0.5 * (fork + limb.fork), length=length)

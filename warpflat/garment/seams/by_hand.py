@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from warpflat.core import FloatArray, InputError, arc_lengths, points_at_lengths, project_on_segments, quote_value
 from warpflat.flat import Surface, SurfacePath, are_joined, geodesic_path, locate, plane_sections, polyline_path
 from warpflat.garment.seams.anatomy import FROM_SHOULDERS, TAILORED, Anatomy
-from warpflat.garment.seams.cloth import Cloth, are_among, edge_components, section
+from warpflat.garment.seams.cloth import LEVELS, Cloth, are_among, edge_components, section
 from warpflat.garment.seams.options import SeamCut, SeamOptions, in_family
+from warpflat.garment.seams.symmetric import SAME_PLACE
 from warpflat.garment.seams.tailor import BESIDE, LEFT, centre_lines
 
 __all__ = ["HAND", "cut_by_hand", "join_ends", "keep_seams", "leave_to_hand", "level_of"]
@@ -36,12 +37,10 @@ _REACH = 0.015
 _MOSTLY = 0.6
 # A curve in which a plane meets the cloth is a wrinkle below this share of the longest one.
 _WRINKLE = 0.05
-# Steps of a polyline over the cloth, in lengths of its edges, and how many there are at most.
-_STEP, _MOST_STEPS = 3.0, 400
-# Vertices of the file that were joined lie at one place, within this share of its diagonal.
-_SAME = 1e-5
-# Girths are measured at so many heights. A yoke lies so far down from the shoulder to the armpit, or from the waist to the crotch.
-_LEVELS, _YOKE = 32, 0.4
+# Steps of a polyline over the cloth, in lengths of its edges.
+_STEP = 3.0
+# A yoke lies so far down from the shoulder to the armpit, or from the waist to the crotch.
+_YOKE = 0.4
 
 
 def cut_by_hand(
@@ -146,7 +145,7 @@ def _paths(
     length = arc_lengths(drawn)
     if length[-1] == 0.0:
         raise InputError("all points of its line are one place; a line has two or more")
-    step = max(_STEP * float(np.linalg.norm(edge[:, 1] - edge[:, 0], axis=1).mean()), float(length[-1]) / _MOST_STEPS)
+    step = _STEP * float(np.linalg.norm(edge[:, 1] - edge[:, 0], axis=1).mean())
     # The corners of the line, and places between them.
     fine = [np.linspace(a, b, max(1, round(float(b - a) / step)), endpoint=False) for a, b in pairwise(length) if b > a]
     places = [_on(surface, point) for point in points_at_lengths(drawn, np.append(np.concatenate(fine), length[-1]))]
@@ -189,7 +188,7 @@ def _owners(surfaces: Sequence[Surface], rows: Sequence[Ids]) -> tuple[list[int]
             # It was joined to another one at its place.
             diagonal = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
             away, near = cKDTree(surface.vertices).query(surface.input_vertices[wanted[lost]])
-            place[lost] = np.where(away <= _SAME * diagonal, near, -1)
+            place[lost] = np.where(away <= SAME_PLACE * diagonal, near, -1)
         places.append(place)
     layers, found = list[int](), list[Ids]()
     for number in np.split(of_row.ravel(), np.cumsum([len(row) for row in rows])[:-1]):
@@ -367,6 +366,6 @@ def level_of(cloth: Cloth, anatomy: Anatomy, name: str, options: SeamOptions) ->
         return waist
     top = min(forks["sleeve"] or [high])
     bottom = max(forks["leg"] or [top - 0.75 * min(top - low, anatomy.size)])
-    levels = np.linspace(top - 0.15 * (top - bottom), bottom + 0.15 * (top - bottom), _LEVELS)
+    levels = np.linspace(top - 0.15 * (top - bottom), bottom + 0.15 * (top - bottom), LEVELS)
     girths = [section(cloth, heights - level, trunk)[0] for level in levels]
     return float(levels[int(np.argmin(girths))])

@@ -19,7 +19,18 @@ from warpflat.core import BoolArray, FloatArray, project_on_segments
 from warpflat.flat import SurfacePath, are_joined, components, half_edges, join_labels, split_faces_along
 from warpflat.garment.seams.fields import TriangleMesh
 
-__all__ = ["ALIKE", "ISLAND", "Cloth", "PieceMesh", "are_among", "edge_components", "section"]
+__all__ = [
+    "ALIKE",
+    "FACES",
+    "ISLAND",
+    "LEVELS",
+    "SAME_WAY",
+    "Cloth",
+    "PieceMesh",
+    "are_among",
+    "edge_components",
+    "section",
+]
 
 Ids = NDArray[np.int64]
 
@@ -29,6 +40,10 @@ _NEAR = 0.2
 _CLEAR = 0.04
 #: Pieces, and seams, are alike if what is measured of them agrees within this share.
 ALIKE = 0.015
+#: Directions are the same from this cosine on, and cloth faces a direction from the second on: within 60 degrees.
+SAME_WAY, FACES = 0.97, 0.5
+#: Girths, and how far cloth reaches, are measured at so many heights.
+LEVELS = 32
 #: An island of the other sign of less than this share of its part is a wrinkle.
 ISLAND = 0.06
 

@@ -22,10 +22,10 @@ from warpflat.core import (
     report_activity,
     two_at_a_time,
 )
-from warpflat.flat import TRIED, Fabric, Flattening, Surface, components
+from warpflat.flat import LEAST_MOUTH, TRIED, Fabric, Flattening, Surface, components
 from warpflat.garment.seams.anatomy import Anatomy
 from warpflat.garment.seams.cloth import ALIKE, Cloth, PieceMesh, edge_components
-from warpflat.garment.seams.lines import MOUTH, WAIST, WIDE, Line, Offer, first_of_equals, offers
+from warpflat.garment.seams.lines import APART, WAIST, WIDE, Line, Offer, first_of_equals, offers
 from warpflat.garment.seams.measure import (
     OWNER,
     PRICE_LEFT,
@@ -50,15 +50,13 @@ Ids = NDArray[np.int64]
 _WORTH, _WORTH_ALONE = 0.002, 0.15
 # What hangs by a neck of so many times what can be sewn hangs by less once it is sewn.
 _HARDLY = 1.5
-# A seam costs nothing if closing it brings no more than this share of the garment's cloth beyond the limit, and no more strain energy than
-# this share of all, and this much [J/m2].
-_NOTHING, _NO_ENERGY, _NO_DENSITY = 1.5e-3, 0.02, 1e-2
+# A seam costs nothing if closing it brings no more cloth beyond the limit than one that is made must bring back, and no more strain energy
+# than this share of all, and this much [J/m2].
+_NO_ENERGY, _NO_DENSITY = 0.02, 1e-2
 # So many pieces a tailor cuts at most.
 _USUAL = {"top": 6, "dress": 6, "skirt": 4, "trousers": 4, "jumpsuit": 12, "sleeve": 2}
 # Seams that a garment keeps even so: it is put together at them. A leg can do without a side seam, a trunk cannot.
 _STRUCTURAL = ("armhole", "inseam", "shoulder", "underarm", "side")
-# A waist is cut through pieces that reach farther than this share of the size above and below it.
-_BESIDE_WAIST = 0.04
 # Names of a seam on trial, and of its mirror image.
 _TRIAL, _MATE = "on trial", "on trial, mirrored"
 
@@ -255,7 +253,7 @@ def _closed_for_nothing(
             most = np.inf if name.startswith(SOLID) else _NO_ENERGY * energy + _NO_DENSITY * area
             of_leg = name.startswith("side") and anatomy.kind == "trousers"
             kept = (name.startswith(_STRUCTURAL) and not of_leg) or any(options.keeps(one) for one in both)
-            if kept or trial.released is None or trial.outside > _NOTHING or trial.released > most:
+            if kept or trial.released is None or trial.outside > _WORTH or trial.released > most:
                 continue
             # Before it is closed, it is known well: the layout of what is joined is far from rest.
             trial, new = price(both, energy_left=TRIAL_LEFT)
@@ -264,7 +262,7 @@ def _closed_for_nothing(
                 trial.released is None
                 or least_width(new, anatomy.size) < least_width(pieces, anatomy.size)
                 or trial.released > len(both) * most
-                or now > max(outside + _NOTHING * area, options.limit * area)
+                or now > max(outside + _WORTH * area, options.limit * area)
             ):
                 continue
             for one in both:
@@ -353,7 +351,7 @@ def _can_be_sewn(cloth: Cloth, line: Line, before: Sequence[Measured], after: Se
         if len(twice):
             gap = piece.result.positions[order[twice]] - piece.result.positions[order[twice + 1]]
             widest = max(widest, float(np.linalg.norm(gap, axis=1).max()))
-    return MOUTH <= widest <= WIDE * cloth.seam_length(_TRIAL)
+    return LEAST_MOUTH <= widest <= WIDE * cloth.seam_length(_TRIAL)
 
 
 def _twin(number: int, pieces: Sequence[Measured], anatomy: Anatomy) -> int | None:
@@ -372,7 +370,7 @@ def _twin(number: int, pieces: Sequence[Measured], anatomy: Anatomy) -> int | No
 
 def _across(cloth: Cloth, among: BoolArray, line: Line, anatomy: Anatomy) -> list[PieceMesh]:
     """Return the pieces of the trunk with some of these faces (#F) that a plane parts well inside."""
-    beside = _BESIDE_WAIST * anatomy.size
+    beside = APART * anatomy.size
     found = []
     for mesh in cloth.pieces(among):
         height = (mesh.vertices - line.point) @ line.normal

@@ -14,16 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core import BoolArray, FloatArray, reflected
-from warpflat.flat import LaidCloth, border_loops, components
-from warpflat.garment.seams.anatomy import FROM_SHOULDERS, Anatomy, has_role
+from warpflat.flat import LEAST_MOUTH, TRIED, LaidCloth, border_loops, components
+from warpflat.garment.seams.anatomy import END, FROM_SHOULDERS, Anatomy, has_role
 from warpflat.garment.seams.by_hand import level_of
-from warpflat.garment.seams.cloth import Cloth
+from warpflat.garment.seams.cloth import ALIKE, Cloth
 from warpflat.garment.seams.fields import TriangleMesh
 from warpflat.garment.seams.measure import Measured
 from warpflat.garment.seams.options import SeamOptions
 from warpflat.garment.seams.tailor import FACING, LEFT
 
-__all__ = ["WAIST", "Line", "Offer", "first_of_equals", "offers"]
+__all__ = ["APART", "WAIST", "Line", "Offer", "first_of_equals", "offers"]
 
 Ids = NDArray[np.int64]
 
@@ -37,18 +37,12 @@ _BULGE, _MISFIT, _PLACES = 0.12, 0.08, 6
 _REACHES = (0.06, 0.11)
 # A dart is no longer than this.
 _LONGEST = 0.32
-# Nearer than this a dart's ends, its tip and the border, two darts, two places, and a place and the plane of symmetry are one.
-_APART = 0.03
-# A dart opens by at least this [m], and no wider than this share of its length: such a wedge is no dart.
-MOUTH, WIDE = 4e-3, 0.6
+#: Nearer than this a dart's ends, its tip and the border, two darts, two places, and a place and the plane of symmetry are one.
+APART = 0.03
+#: What opens wider than this share of its length is a wedge, and no dart.
+WIDE = 0.6
 # A centimetre sewn counts as this much cloth beyond the limit [m2].
 _PRICE = 1e-5
-# What is worth the same within this share is chosen by its place.
-_EQUAL = 0.02
-# So many darts are offered for a piece.
-_OFFERS = 3
-# The hem of what opens in front is the lowest share of its height.
-_HEM = 0.15
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -84,7 +78,7 @@ class Line:
             return False
         # A line around the front runs on both sides, wherever its place is.
         around = self.level is not None and self.level[0] == FACING
-        return around or abs(self.beside(anatomy)) > _APART * anatomy.size
+        return around or abs(self.beside(anatomy)) > APART * anatomy.size
 
     def mirrored(self, anatomy: Anatomy) -> Line:
         """Return its mirror image."""
@@ -132,8 +126,8 @@ class Offer:
 
 
 def first_of_equals(values: FloatArray) -> Ids:
-    """Return the order of values from the largest on; those that agree within a share are equal, and keep their places."""
-    bins = np.floor(np.log(np.maximum(values, 1e-12)) / _EQUAL)
+    """Return the order of values from the largest on; those that are alike keep their places."""
+    bins = np.floor(np.log(np.maximum(values, 1e-12)) / ALIKE)
     return np.lexsort((np.arange(len(values)), -bins))
 
 
@@ -158,7 +152,7 @@ def offers(
         *(_seams(cloth, piece, laid, places, anatomy, options, twice=twice) if may_part else ()),
     ):
         cost, sides = laid.price(rows), 2 if twice else 1
-        if not line.parts and not (cost.opens and MOUTH <= cost.opening <= WIDE * cost.length / len(rows)):
+        if not line.parts and not (cost.opens and LEAST_MOUTH <= cost.opening <= WIDE * cost.length / len(rows)):
             continue
         more = sides * len(rows) if line.parts else 0
         found.append(Offer(line=line, gain=sides * cost.relieved, length=sides * cost.length, more=more))
@@ -166,8 +160,8 @@ def offers(
     best = list[Offer]()
     for one in (found[k] for k in order.tolist()):
         alike = [other for other in best if other.line.name == one.line.name]
-        apart = all(np.linalg.norm(one.middle - other.middle) > _APART * anatomy.size for other in alike)
-        if one.gain > 0.0 and apart and len(alike) < _OFFERS:
+        apart = all(np.linalg.norm(one.middle - other.middle) > APART * anatomy.size for other in alike)
+        if one.gain > 0.0 and apart and len(alike) < TRIED:
             best.append(one)
     return best
 
@@ -183,10 +177,10 @@ def _darts(
     inner = np.flatnonzero(~laid.border)
     facing = piece.mesh.area_vectors
     across = anatomy.across(surface.vertices)
-    middle = _APART * size
+    middle = APART * size
     whole = anatomy.mirror is not None and not twice and across.min() < -middle and across.max() > middle
     away = np.linalg.norm(flat[loop][:, None] - flat[inner], axis=2).min(axis=0)
-    deep = inner[away >= _APART * size]
+    deep = inner[away >= APART * size]
     ends = list[tuple[int, int]]()
     for place in places:
         if whole and across[place] < -middle:
@@ -202,7 +196,7 @@ def _darts(
                 tip = flat[mouth] + reach * size * inwards
                 ends.append((mouth, int(deep[np.linalg.norm(flat[deep] - tip, axis=1).argmin()])))
     for mouth, tip in dict.fromkeys(ends):
-        if not _APART * size < float(np.linalg.norm(flat[tip] - flat[mouth])) < _LONGEST * size:
+        if not APART * size < float(np.linalg.norm(flat[tip] - flat[mouth])) < _LONGEST * size:
             continue
         start, end = surface.vertices[[mouth, tip]]
         normal = np.cross(end - start, facing[(surface.faces[:, :3] == tip).any(axis=1)].mean(axis=0))
@@ -250,7 +244,7 @@ def _places(piece: Measured, anatomy: Anatomy) -> list[int]:
         total = np.bincount(up, np.maximum(density, 0.0) * mesh.mass, minlength=len(vertices))
         tops = np.flatnonzero(total > max(least, 1e-12))
         for top in tops[first_of_equals(np.asarray(total[tops], dtype=np.float64))][:_PLACES].tolist():
-            if all(np.linalg.norm(vertices[top] - vertices[one]) > _APART * anatomy.size for one in found):
+            if all(np.linalg.norm(vertices[top] - vertices[one]) > APART * anatomy.size for one in found):
                 found.append(top)
     return found
 
@@ -344,6 +338,6 @@ def _at_hem(cloth: Cloth, vertices: Ids, anatomy: Anatomy) -> BoolArray:
     No dart begins there: what hangs is shaped from above.
     """
     heights = cloth.vertices @ anatomy.up
-    low = heights[vertices] < heights.min() + _HEM * np.ptp(heights)
+    low = heights[vertices] < heights.min() + END * np.ptp(heights)
     ends = has_role(cloth, vertices, "hem", "sleeve", "leg")
     return np.asarray(ends | (low & has_role(cloth, vertices, "opening")))

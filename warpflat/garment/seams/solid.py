@@ -28,7 +28,7 @@ from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 from warpflat.core import FloatArray, IntArray, polyline_length, unit
 from warpflat.flat import border_loops, inner_borders
 from warpflat.garment.seams.anatomy import HOLE, Anatomy
-from warpflat.garment.seams.cloth import Cloth, PieceMesh, section
+from warpflat.garment.seams.cloth import ALIKE, SAME_WAY, Cloth, PieceMesh, section
 from warpflat.garment.seams.fields import TriangleMesh
 from warpflat.garment.seams.symmetric import mirror_image, mirrored
 
@@ -65,31 +65,24 @@ NARROW, _THIN = 0.05, 0.05
 SEWABLE = 5e-3
 # Normals, and rings around the ends of limbs, are smoothed over this share of the size: wrinkles and facets are no shape.
 _SMOOTH = 0.04
-# A cut pays for itself: a seam as long as the part is wide counts as this strain.
+# A cut pays for itself: a seam as long as the part is wide counts as this strain. So does a cut of a round part that leaves parts which
+# are not alike, as these are drawn once.
 _SEAM = 0.005
-# Parts that are alike are drawn once: a cut of a round part that leaves others, larger by this share, counts as this strain more.
-_ALIKE, _UNLIKE = 0.03, 0.005
-# Axes along which a part is as long as along another within this share are none of its own: those of space serve.
-_ROUND = 0.05
-# Axes are the same from this cosine on.
-_NEARLY = 0.97
 # Where cloth faces an axis by more than this (cosine) it is a base.
 _BASE = 0.6
 # The border of a panel squared is at least this share of a disk's; a cap's is shorter.
 _PANEL = 0.8
 # Limbs are looked for around so many places, far from one another.
 _TIPS = 16
-# In a limb lies the curvature of half a ball, 2 pi, within these shares of pi; its root is the ring in which less than the third is left,
-# and the cloth beyond takes it below the last: the toe of a sock is no limb.
-_THIMBLE, _EXCESS, _ROOT, _SPENT = 1.7, 2.3, 1.5, 0.5
+# In a limb lies the curvature of half a ball, 2 pi, within this share of pi; its root is the ring in which less is left, and the cloth
+# beyond takes it away, but for this: the toe of a sock is no limb.
+_OFF = 0.4
 # The ring around a limb squared is at most this share of a disk's of the limb's area; what is a larger share of the whole is its trunk.
 _LIMB, _TRUNK = 0.35, 0.25
 # Parts at most, and how many more for each limb.
 _MOST, _PER_LIMB = 16, 3
 # A part smaller than this share of the whole is not cut further, and is a tip where cloth is taken off all around.
 _LEAST = 0.02
-# A field is its own mirror image from this cosine on.
-_ITSELF = 0.99
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -330,9 +323,9 @@ def _limbs(mesh: PieceMesh, mirror: Anatomy | None) -> tuple[FloatArray, int]:
         far = -_SMOOTH * size * np.log(np.maximum(warm, 1e-300))
         order = np.argsort(far)
         inside = np.cumsum(curvature[order])[: int(np.isin(order, rim).argmax()) if len(rim) else None] / np.pi
-        grown = np.flatnonzero(inside > _THIMBLE)
-        lost = grown[0] + np.flatnonzero(inside[grown[0] :] < _ROOT) if len(grown) else grown
-        if len(lost) == 0 or inside[lost[0] :].min() > _SPENT or np.abs(inside[: lost[0]] - 1.0).max() > _EXCESS - 1.0:
+        grown = np.flatnonzero(inside > 2.0 - _OFF)
+        lost = grown[0] + np.flatnonzero(inside[grown[0] :] < 2.0 - _OFF) if len(grown) else grown
+        if len(lost) == 0 or inside[lost[0] :].min() > _OFF or np.abs(inside[: lost[0]] - 1.0).max() > 1.0 + _OFF:
             continue
         field = far[order[lost[0]]] - far
         length = section(whole, field, np.ones(len(mesh.faces), dtype=bool))[0]
@@ -378,7 +371,7 @@ def _ways(mesh: PieceMesh, mirror: Anatomy | None) -> Iterator[_Way]:
     centre = share @ middles
     values, vectors = np.linalg.eigh(((middles - centre) * share[:, None]).T @ (middles - centre))
     axes = vectors.T
-    same = values[1:] <= (1.0 + _ROUND) * values[:-1]
+    same = values[1:] <= (1.0 + ALIKE) * values[:-1]
     if same.all():
         axes = np.eye(3)
     elif same.any():
@@ -392,7 +385,7 @@ def _ways(mesh: PieceMesh, mirror: Anatomy | None) -> Iterator[_Way]:
     axes = np.array(
         [
             np.sign(axis[np.abs(axis).argmax()]) * np.eye(3)[np.abs(axis).argmax()]
-            if np.abs(axis).max() > _NEARLY
+            if np.abs(axis).max() > SAME_WAY
             else axis
             for axis in axes
         ]
@@ -400,7 +393,7 @@ def _ways(mesh: PieceMesh, mirror: Anatomy | None) -> Iterator[_Way]:
     fields = (mesh.vertices - centre) @ axes.T
     if mirror is not None:
         k = int(np.abs(axes @ mirror.normal).argmax())
-        if abs(float(axes[k] @ mirror.normal)) > _NEARLY:
+        if abs(float(axes[k] @ mirror.normal)) > SAME_WAY:
             axes[k], fields[:, k] = mirror.normal, mesh.vertices @ mirror.normal - mirror.offset
     # To the nanometre: on which side a vertex in the plane of symmetry lies is not for rounding to say.
     fields = np.round(fields, 9)
@@ -446,7 +439,7 @@ def _best_way(
     for way in _ways(mesh, None if image is None else mirror) if neck is None else [_across_neck(mesh, neck)]:
         if image is not None:
             other = way.field[image]
-            alike = abs(float(way.field @ other)) > _ITSELF * float(np.linalg.norm(way.field) * np.linalg.norm(other))
+            alike = abs(float(way.field @ other)) > SAME_WAY * float(np.linalg.norm(way.field) * np.linalg.norm(other))
             if neck is None and not alike:
                 continue
             if not alike:
@@ -462,7 +455,7 @@ def _best_way(
         if len(parts) == 1 or min(areas) < 0.3 * _LEAST * total:
             continue
         cost = _SEAM * made.seam_length("way") / np.sqrt(sum(areas)) + sum(_topology(part) for part in parts)
-        cost += _UNLIKE * way.round * (max(areas) > (1.0 + _ALIKE) * min(areas))
+        cost += _SEAM * way.round * (max(areas) > (1.0 + ALIKE) * min(areas))
         cost += sum(_strain(part, known) * area for part, area in zip(parts, areas, strict=True)) / sum(areas)
         found.append((cost, made, way.field))
     best: tuple[float, FloatArray] | None = None

@@ -10,26 +10,24 @@ from scipy.spatial import cKDTree
 
 from warpflat.core import FloatArray, other_side, project_on_segments
 from warpflat.garment.seams.anatomy import Anatomy
-from warpflat.garment.seams.cloth import Cloth, PieceMesh, are_among, edge_components
+from warpflat.garment.seams.cloth import FACES, LEVELS, Cloth, PieceMesh, are_among, edge_components
 from warpflat.garment.seams.fields import TriangleMesh
 
-__all__ = ["averaged", "mirror_image", "mirrored"]
+__all__ = ["SAME_PLACE", "averaged", "mirror_image", "mirrored"]
 
 Ids = NDArray[np.int64]
 
 # Lengths are shares of the garment's size, the square root of its area.
-# Vertices are mirror images of each other within this.
-_SAME = 1e-6
+#: Vertices are at one place within this.
+SAME_PLACE = 1e-5
 # Cloth is averaged if its mirror image lies as near as this, in the mean and at all but a hundredth of its vertices: half of this it moves.
 _MEAN, _FARTHEST = 0.01, 0.035
 # The move of the cloth fades over this where a border moves by more.
 _FADE = 0.05
-# Cloth crosses the plane where the way over it leads across by this (cosine).
-_STEEP = 0.5
 # A seam that keeps so near to the plane of symmetry is in it.
 _IN_PLANE = 0.008
-# Cloth that is so far from the plane, as a share of what is the farthest at its height, one of so many levels, is of its side.
-_FAR, _LEVELS = 0.5, 32
+# Cloth that is so far from the plane, as a share of what is the farthest at its height, is of its side.
+_FAR = 0.5
 # What is mirrored has the area of what it was made from within this: sides that lie as near as that to each other differ by wrinkles.
 _SAME_AREA = 0.05
 # Cloth that moves by less is not worth a word [m].
@@ -39,7 +37,7 @@ _TOLD = 5e-4
 def mirror_image(mesh: PieceMesh, other: PieceMesh, anatomy: Anatomy) -> Ids | None:
     """Return for each vertex of a piece the one of another piece that is its mirror image; None where the other is not its mirror image."""
     away, nearest = cKDTree(other.vertices).query(anatomy.image(mesh.vertices))
-    return nearest if float(away.max()) < _SAME * anatomy.size else None
+    return nearest if float(away.max()) < SAME_PLACE * anatomy.size else None
 
 
 def averaged(cloth: Cloth, anatomy: Anatomy) -> tuple[Cloth, str, bool]:
@@ -157,10 +155,8 @@ def _between_sides(cloth: Cloth, anatomy: Anatomy) -> FloatArray:
     """
     lateral = anatomy.across(cloth.vertices)
     heights = cloth.vertices @ anatomy.up
-    level = np.clip(
-        ((heights - heights.min()) / max(np.ptp(heights), 1e-300) * _LEVELS).astype(np.int64), 0, _LEVELS - 1
-    )
-    farthest = np.zeros(_LEVELS)
+    level = np.clip(((heights - heights.min()) / max(np.ptp(heights), 1e-300) * LEVELS).astype(np.int64), 0, LEVELS - 1)
+    farthest = np.zeros(LEVELS)
     np.maximum.at(farthest, level, np.abs(lateral))
     far = np.flatnonzero(np.abs(lateral) > np.maximum(_FAR * farthest[level], _FADE * anatomy.size))
     edges = cloth.half_edges.edges.astype(np.int64)
@@ -189,7 +185,7 @@ def _plainly_across(cloth: Cloth, field: FloatArray, lateral: FloatArray, anatom
     # Of a linear function, by the edges opposite to the corners, each turned by a right angle.
     turned = np.cross(normals[:, None], np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1))
     rise = np.einsum("fk,fka->fa", field[cloth.faces], turned)
-    across = rise @ anatomy.normal > _STEEP * np.linalg.norm(rise, axis=1)
+    across = rise @ anatomy.normal > FACES * np.linalg.norm(rise, axis=1)
     other = (np.abs(lateral[cloth.faces]).min(axis=1) < 2.0 * near) & ~across
     away = np.full(len(lateral), np.inf)
     if other.any():

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warpflat.core import BoolArray, FloatArray, reflected, unit
 from warpflat.flat import border_loops, components
 from warpflat.garment.seams.anatomy import FROM_SHOULDERS, Anatomy, Limb
-from warpflat.garment.seams.cloth import ISLAND, Cloth, edge_components, section
+from warpflat.garment.seams.cloth import FACES, ISLAND, LEVELS, Cloth, edge_components, section
 
 __all__ = [
     "BESIDE",
@@ -29,22 +29,20 @@ Ids = NDArray[np.int64]
 
 # Lengths are shares of the garment's size, the square root of its area.
 # Wrinkles that are shorter than some three of these do not bend a seam.
-_SMOOTH, _SCREEN = 0.035, 0.07
-# The cloth at the plane of symmetry faces to the front or the back by at least this (cosine); between, at a crotch, it does neither.
-_FACES = 0.5
+_SMOOTH = 0.035
 # The armhole leans outwards towards the shoulder by this [rad]: a body is wider there than at the armpit.
 _LEAN = np.radians(8.0)
-# The armhole runs outside of the armpit by this, and by more where it would not close around the sleeve.
-_OUTSIDE, _STEP, _STEPS = 0.004, 0.008, 12
+# The armhole is looked for in such steps outwards, from half of one outside of the armpit.
+_STEP = 0.008
 # Where it closes around the sleeve only so much farther outside, it ends at the neck, of which the sleeve then has a share.
 _BARE = 0.05
 # Its length falls by no more than this over the way outwards once it runs around the sleeve.
 _STEEP = 3.0
 # Nor does its plane follow an arm further than this: one that hangs, and one that is raised.
 _HANGS, _RAISED = np.radians(-4.0), np.radians(30.0)
-# Levels between armpits and crown; a hood is wider, across its opening, than the neck below it by this, and the shoulders are by more. It
+# A hood is wider, across its opening, than the neck below it by this, and the shoulders are by more. It
 # has such a share of the cloth, and its opening goes up by at least this share of its height.
-_LEVELS, _WIDER, _ROOT, _SHOULDERS, _HOOD, _FACE = 25, 1.1, 1.35, 1.5, (0.05, 0.4), 0.5
+_WIDER, _ROOT, _SHOULDERS, _HOOD, _FACE = 1.1, 1.35, 1.5, (0.05, 0.4), 0.5
 #: A line that the user has drawn is meant where a tailor would have cut within this.
 BESIDE = 0.08
 # A sleeve has no more than this share of the neck, or of the opening.
@@ -88,8 +86,9 @@ def draw_fields(cloth: Cloth, anatomy: Anatomy) -> Fields:
     # The cloth at the centre lines is wholly in front, or wholly behind.
     changes = (left[cloth.faces].min(axis=1) < 0.0) & (left[cloth.faces].max(axis=1) >= 0.0)
     centre = np.unique(cloth.faces[changes])
-    centre = centre[np.abs(facing[centre]) > _FACES]
-    front = cloth.solve(centre, np.sign(facing[centre]), data=facing, length=_SCREEN * size)
+    # Between, at a crotch, it faces neither way.
+    centre = centre[np.abs(facing[centre]) > FACES]
+    front = cloth.solve(centre, np.sign(facing[centre]), data=facing, length=2.0 * _SMOOTH * size)
     front = front if mirror is None else mirror.symmetrised(front)
     values = {**cloth.values, FACING: front, LEFT: left}
     sleeves = {}
@@ -197,7 +196,7 @@ def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> 
     lengths, middles, offsets = list[float](), list[FloatArray](), list[float]()
     bare: tuple[float, FloatArray] | None = None
     for number in range(60):
-        offset = _OUTSIDE * anatomy.size + number * step
+        offset = (number + 0.5) * step
         beyond = cloth.reached(height > offset, rim)
         if offset >= height[rim].min():
             break
@@ -321,9 +320,9 @@ def _cut_armhole(cloth: Cloth, anatomy: Anatomy, name: str, limb: Limb, number: 
     """Return the cloth with an armhole cut: the first line outside of the armpit that closes around the sleeve; None if none does."""
     rim = anatomy.borders[limb.border].vertices
     base = cloth.values[name]
-    for step in range(_STEPS):
+    for outwards in np.arange(0.0, BESIDE, _STEP) * anatomy.size:
         everywhere = np.ones(len(cloth.faces), dtype=bool)
-        trial = cloth.with_values(**{name: base - 0.006 * step * anatomy.size})
+        trial = cloth.with_values(**{name: base - outwards})
         trial = trial.without_islands(name, everywhere, keep=ISLAND / 20)
         # Only the part beyond the line that holds the sleeve's end is the sleeve.
         part = trial.reached(trial.values[name] > 0.0, rim)
@@ -356,7 +355,7 @@ def _cut_hood(cloth: Cloth, anatomy: Anatomy) -> Cloth:
     shoulder = max(
         (float(limb.fork @ anatomy.up) for limb in anatomy.limbs_of("sleeve")), default=top - 0.4 * anatomy.size
     )
-    levels = np.linspace(shoulder, top, _LEVELS)[1:-1]
+    levels = np.linspace(shoulder, top, LEVELS)[1:-1]
     # Around the cloth and across the opening: a hood is open there.
     girths = np.array(
         [

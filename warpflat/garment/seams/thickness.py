@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from warpflat.core import BoolArray, format_count, unit
 from warpflat.flat import join_labels
-from warpflat.garment.seams.anatomy import HOLE, Border
+from warpflat.garment.seams.anatomy import HOLE, RING, Border
 from warpflat.garment.seams.cloth import Cloth
 
 __all__ = ["even_line", "without_thickness"]
@@ -22,8 +22,6 @@ _ACROSS, _RIM, _UPRIGHT = 0.9, 0.025, 0.85
 _WIDEST = 0.15
 # What takes more than this share of a piece that the user has drawn is that piece, as a waistband, and is worn as it lies.
 _PIECE = 0.5
-# An opening is level from this on (its area over that of a circle as long).
-_LEVEL = 0.4
 # The line where it ends is evened over this share of the garment's size, and lies within so much of where it was; a line that strays
 # from it by no more than the third is even.
 _EVEN, _REACH, _RAGGED = 0.03, 0.05, 0.004
@@ -37,7 +35,7 @@ def without_thickness(cloth: Cloth) -> tuple[Cloth, list[str]]:
     piece = np.bincount(part, areas)
     for loop in cloth.loops:
         border = Border.measured(cloth.vertices, loop)
-        if border.length < HOLE * size or np.linalg.norm(border.normal) < _LEVEL:
+        if border.length < HOLE * size or np.linalg.norm(border.normal) < RING:
             continue
         turned = _turned(cloth, border, size)
         if turned is not None and (np.bincount(part, areas * turned) <= _PIECE * piece).all():
