@@ -253,7 +253,7 @@ def _straight(
         # Sheared quads give way along their diagonals, which a crack in the membrane does not know: of theirs the shortest.
         yield from sorted(around, key=lambda one: one[0].price.length if quads else -one[0].price.per_metre)[:1]
     rim = np.flatnonzero(laid.border & np.isin(result.vertex_origin, border_edges(surface.faces)))
-    start = int(rim[np.linalg.norm(flat[rim] - flat[place], axis=1).argmin()])
+    start = laid.nearest(rim, flat[place])
     made = (path for one in result.cuts for path in one.paths)
     if np.linalg.norm(flat[start] - flat[place]) > _REACH * size or any(
         _distance(surface, path, int(result.vertex_origin[start])) < _REACH * size for path in made
@@ -264,8 +264,7 @@ def _straight(
     inner = np.flatnonzero(~laid.border)
     middle = inner[distance_from(surface, np.unique(border_edges(surface.faces)))[result.vertex_origin[inner]].argmax()]
     for kind, share in _INWARDS.items():
-        aim = (1.0 - share) * flat[start] + share * flat[middle]
-        tip = int(inner[np.linalg.norm(flat[inner] - aim, axis=1).argmin()])
+        tip = laid.nearest(inner, (1.0 - share) * flat[start] + share * flat[middle])
         yield from priced(f"{kind} {_last_number(result, 'inward') + number + 1}", laid.dart(start, tip))
 
 

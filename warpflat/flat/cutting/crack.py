@@ -142,6 +142,10 @@ class LaidCloth:
         strain = self._strain + (ahead - back) / (2.0 * _STEP)
         return area_beyond(self.network.fabric, strain, self._area)
 
+    def nearest(self, among: Ids, place: FloatArray) -> int:
+        """Return which of some vertices lies nearest to a place in the layout (2 [m])."""
+        return int(among[np.linalg.norm(self.positions[among] - place, axis=1).argmin()])
+
     def row(self, start: int, end: int, off: FloatArray) -> Ids | None:
         """Return the vertices of a path along edges near to a line that does not touch a border on its way; None if there is none.
 

@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from warpflat.core import FloatArray, points_at_lengths, polyline_length, reflected, unit
 from warpflat.flat import components
-from warpflat.garment.seams.cloth import FACES, SAME_WAY, Cloth, section
+from warpflat.garment.seams.cloth import BESIDE_LINE, FACES, SAME_WAY, Cloth, section
 from warpflat.garment.seams.fields import MirrorMap, mirror_map
 
 __all__ = [
@@ -218,7 +218,7 @@ def find_anatomy(cloth: Cloth, *, up: str | None = None, front: str | None = Non
             words = f"up is taken as {axis_name(made.up)}, {why}; --up says otherwise"
             made = replace(made, notes=(words, *made.notes))
     if made.symmetric:
-        made = replace(made, mirror=mirror_map(cloth, made.normal, made.offset, reach=0.05 * made.size))
+        made = replace(made, mirror=mirror_map(cloth, made.normal, made.offset, reach=BESIDE_LINE * made.size))
     return made
 
 

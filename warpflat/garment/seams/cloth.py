@@ -21,6 +21,7 @@ from warpflat.garment.seams.fields import TriangleMesh
 
 __all__ = [
     "ALIKE",
+    "BESIDE_LINE",
     "FACES",
     "ISLAND",
     "LEVELS",
@@ -42,6 +43,8 @@ _CLEAR = 0.04
 ALIKE = 0.015
 #: Directions are the same from this cosine on, and cloth faces a direction from the second on: within 60 degrees.
 SAME_WAY, FACES = 0.97, 0.5
+#: Cloth within this share of the size is beside a line: what moves with the line fades over it.
+BESIDE_LINE = 0.05
 #: Girths, and how far cloth reaches, are measured at so many heights.
 LEVELS = 32
 #: An island of the other sign of less than this share of its part is a wrinkle.
@@ -106,6 +109,21 @@ class Cloth(TriangleMesh):
         """Return the cloth with other labels; one that is None is left out."""
         every = {**self.labels, **labels}
         return replace(self, labels={name: label for name, label in every.items() if label is not None})
+
+    def only(self, faces: BoolArray) -> Cloth:
+        """Return some of the faces (#F) alone, with the vertices that they use, and what of the seams runs along them."""
+        used, place = np.unique(self.faces[faces], return_inverse=True)
+        number = np.full(len(self.vertices), -1, dtype=np.int64)
+        number[used] = np.arange(len(used))
+        made = Cloth(
+            vertices=self.vertices[used],
+            faces=place.reshape(-1, 3).astype(np.int64),
+            values={name: value[used] for name, value in self.values.items()},
+            labels={name: label[faces] for name, label in self.labels.items()},
+        )
+        seams = {name: np.sort(number[edges], axis=1) for name, edges in self.seams.items()}
+        kept = {name: edges[are_among(edges, made.half_edges.edges)] for name, edges in seams.items()}
+        return replace(made, seams=kept)
 
     def sleeve_of(self, mesh: PieceMesh) -> int:
         """Return the number of the sleeve, or of the hood behind the last one, of which a piece is; -1 for the trunk."""
@@ -368,7 +386,7 @@ class Parted(NamedTuple):
     edges: Ids
 
 
-def are_among(edges: NDArray[np.integer], others: Ids) -> BoolArray:
+def are_among(edges: NDArray[np.integer], others: NDArray[np.integer]) -> BoolArray:
     """Return #E, whether edges (#E by 2) are among others (#O by 2), whichever vertex is named first."""
     return are_joined(np.unique(np.sort(others, axis=1), axis=0), *edges.T)
 

@@ -222,11 +222,11 @@ def _first_seams(
     """
     notes, why, auto = list[str](), "", options.find == "auto"
     if anatomy.kind in TAILORED:
-        fields = draw_fields(cloth, anatomy)
+        cloth = draw_fields(cloth, anatomy)
         if auto or options.keep:
-            cloth, notes = cut_as_a_tailor(fields, anatomy, hood=not options.forbids("hood"))
+            cloth, notes = cut_as_a_tailor(cloth, anatomy, hood=not options.forbids("hood"))
         else:
-            cloth = with_drawn_sleeves(fields, anatomy, anywhere=True)
+            cloth = with_drawn_sleeves(cloth, anatomy, anywhere=True)
         for name in list(cloth.seams):
             if not (auto or name.startswith(HAND) or options.keeps(name)):
                 cloth = cloth.without_seam(name)

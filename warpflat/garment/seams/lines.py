@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, FloatArray, reflected
+from warpflat.core import BoolArray, FloatArray, reflected, unit
 from warpflat.flat import LEAST_MOUTH, TRIED, LaidCloth, border_loops, components
 from warpflat.garment.seams.anatomy import END, FROM_SHOULDERS, Anatomy, has_role
 from warpflat.garment.seams.by_hand import level_of
@@ -189,12 +189,9 @@ def _darts(
             ends += [(mouth, place) for mouth in laid.mouths(place) if mouth in starts]
         elif len(starts) and len(deep):
             # A place at the border is reached from there: inwards by a hand.
-            mouth = int(starts[np.linalg.norm(flat[starts] - flat[place], axis=1).argmin()])
-            near = deep[np.linalg.norm(flat[deep] - flat[mouth], axis=1).argmin()]
-            inwards = (flat[near] - flat[mouth]) / np.linalg.norm(flat[near] - flat[mouth])
-            for reach in _REACHES:
-                tip = flat[mouth] + reach * size * inwards
-                ends.append((mouth, int(deep[np.linalg.norm(flat[deep] - tip, axis=1).argmin()])))
+            mouth = laid.nearest(starts, flat[place])
+            inwards = unit(flat[laid.nearest(deep, flat[mouth])] - flat[mouth])
+            ends += [(mouth, laid.nearest(deep, flat[mouth] + reach * size * inwards)) for reach in _REACHES]
     for mouth, tip in dict.fromkeys(ends):
         if not APART * size < float(np.linalg.norm(flat[tip] - flat[mouth])) < _LONGEST * size:
             continue

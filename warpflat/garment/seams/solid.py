@@ -38,7 +38,7 @@ __all__ = [
     "SEWABLE",
     "SOLID",
     "LaidFlat",
-    "Measure",
+    "LayFlat",
     "is_open",
     "is_panel",
     "part_solids",
@@ -103,7 +103,7 @@ class LaidFlat:
 
 
 #: Lays a piece of a cloth flat; the third argument is the width from which on nothing is narrow [m].
-Measure = Callable[[Cloth, PieceMesh, float], LaidFlat]
+LayFlat = Callable[[Cloth, PieceMesh, float], LaidFlat]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -144,7 +144,7 @@ def part_solids(
     shape: bool,
     mirror: Anatomy | None = None,
     most: int | None = None,
-    measure: Measure | None = None,
+    measure: LayFlat | None = None,
 ) -> tuple[Cloth, list[str]]:
     """Return the cloth with its pieces cut until each is a disk or a tube, and notes.
 
@@ -412,7 +412,7 @@ def _key(mesh: PieceMesh, area: float) -> tuple[int, float]:
     return len(mesh.face_of), round(area, 9)
 
 
-def _remembering(measure: Measure, width: float) -> Callable[[Cloth, PieceMesh], LaidFlat]:
+def _remembering(measure: LayFlat, width: float) -> Callable[[Cloth, PieceMesh], LaidFlat]:
     """Return a measure that lays pieces that are alike flat once."""
     known: dict[tuple[int, float], LaidFlat] = {}
 
@@ -483,7 +483,7 @@ def _across_neck(mesh: PieceMesh, neck: FloatArray) -> _Way:
     ahead = np.flatnonzero(field > 0.0)
     if len(ahead):
         first = ahead[np.linalg.norm(points[ahead] - middle, axis=1).argmin()]
-        field = np.where(mesh.reached(field > 0.0, first[None]), field, -np.abs(field))
+        field = np.where(mesh.reached(field > 0.0, np.array([first])), field, -np.abs(field))
     return _Way(field=field, name="neck", round=False)
 
 

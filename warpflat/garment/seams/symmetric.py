@@ -10,8 +10,7 @@ from scipy.spatial import cKDTree
 
 from warpflat.core import FloatArray, other_side, project_on_segments
 from warpflat.garment.seams.anatomy import Anatomy
-from warpflat.garment.seams.cloth import FACES, LEVELS, Cloth, PieceMesh, are_among, edge_components
-from warpflat.garment.seams.fields import TriangleMesh
+from warpflat.garment.seams.cloth import BESIDE_LINE, FACES, LEVELS, Cloth, PieceMesh, are_among, edge_components
 
 __all__ = ["SAME_PLACE", "averaged", "mirror_image", "mirrored"]
 
@@ -22,8 +21,6 @@ Ids = NDArray[np.int64]
 SAME_PLACE = 1e-5
 # Cloth is averaged if its mirror image lies as near as this, in the mean and at all but a hundredth of its vertices: half of this it moves.
 _MEAN, _FARTHEST = 0.01, 0.035
-# The move of the cloth fades over this where a border moves by more.
-_FADE = 0.05
 # A seam that keeps so near to the plane of symmetry is in it.
 _IN_PLANE = 0.008
 # Cloth that is so far from the plane, as a share of what is the farthest at its height, is of its side.
@@ -68,7 +65,9 @@ def averaged(cloth: Cloth, anatomy: Anatomy) -> tuple[Cloth, str, bool]:
     if fixed:
         held = np.concatenate(fixed)
         gap[held] = np.concatenate(given)
-        gap = np.stack([cloth.solve(held, column[held], data=column, length=_FADE * size) for column in gap.T], axis=1)
+        gap = np.stack(
+            [cloth.solve(held, column[held], data=column, length=BESIDE_LINE * size) for column in gap.T], axis=1
+        )
     away = np.linalg.norm(gap, axis=1)
     share = cloth.mass / cloth.mass.sum()
     if float(share @ away) > _MEAN * size or float(np.quantile(away, 0.99)) > _FARTHEST * size:
@@ -97,49 +96,38 @@ def mirrored(cloth: Cloth, anatomy: Anatomy) -> tuple[Cloth, str]:
         return cloth, "it has no plane of symmetry"
     if lone := sorted(name for name in cloth.seams if other_side(name) not in cloth.seams):
         return cloth, f"{lone[0]} is on one side alone"
-    normal, offset, size = anatomy.normal, anatomy.offset, anatomy.size
     split = cloth.with_values(across=_between_sides(cloth, anatomy))
     split, left, _ = split.split("across", np.ones(len(cloth.faces), dtype=bool))
     if not left.any() or left.all():
         return cloth, "one side has no cloth"
-    used, place = np.unique(split.faces[left], return_inverse=True)
-    faces = place.reshape(-1, 3).astype(np.int64)
-    half = split.vertices[used]
-    height = half @ normal - offset
-    middle = np.flatnonzero(split.values["across"][used] == 0.0)
-    still = np.zeros(len(half))
-    moved = TriangleMesh(vertices=half, faces=faces).solve(middle, -height[middle], data=still, length=_FADE * size)
-    height = height + moved
-    height[middle] = 0.0
-    half = half + (height - (half @ normal - offset))[:, None] * normal
-    off = np.setdiff1d(np.arange(len(used)), middle)
-    twin = np.arange(len(used))
-    twin[off] = len(used) + np.arange(len(off))
-    place_of = np.full(len(split.vertices), -1, dtype=np.int64)
-    place_of[used] = np.arange(len(used))
-    edges_left = TriangleMesh(vertices=half, faces=faces).half_edges.edges.astype(np.int64)
+    half = split.only(left)
+    height, count = anatomy.across(half.vertices), len(half.vertices)
+    middle = np.flatnonzero(half.values["across"] == 0.0)
+    level = height + half.solve(middle, -height[middle], data=np.zeros(count), length=BESIDE_LINE * anatomy.size)
+    level[middle] = 0.0
+    vertices = half.vertices + (level - height)[:, None] * anatomy.normal
+    off = np.setdiff1d(np.arange(count), middle)
+    twin = np.arange(count)
+    twin[off] = count + np.arange(len(off))
     seams: dict[str, Ids] = {}
-    for name, edges in split.seams.items():
-        own = np.sort(place_of[edges], axis=1)
-        own = own[(own >= 0).all(axis=1)]
-        own = own[are_among(own, edges_left)]
-        for title, rows in ((name, own), (other_side(name), np.sort(twin[own], axis=1))):
+    for name, edges in half.seams.items():
+        for title, rows in ((name, edges), (other_side(name), np.sort(twin[edges], axis=1))):
             if len(rows):
                 seams[title] = np.unique(np.concatenate([seams[title], rows]) if title in seams else rows, axis=0)
-    sleeves = anatomy.limbs_of("sleeve")
-    mates = {sleeves.index(one): sleeves.index(mate) for one in sleeves if (mate := anatomy.mate(one)) is not None}
     values = {
-        name: np.concatenate([value[used], (-1.0 if name == "left" else 1.0) * value[used][off]])
-        for name, value in split.values.items()
+        name: np.concatenate([value, (-1.0 if name == "left" else 1.0) * value[off]])
+        for name, value in half.values.items()
         if name != "across"
     }
+    sleeves = anatomy.limbs_of("sleeve")
+    mates = {sleeves.index(one): sleeves.index(mate) for one in sleeves if (mate := anatomy.mate(one)) is not None}
     labels = {}
-    for name, label in split.labels.items():
-        image = np.array([mates.get(int(one), int(one)) for one in label[left]]) if name == "sleeve" else label[left]
-        labels[name] = np.concatenate([label[left], image])
+    for name, label in half.labels.items():
+        image = np.array([mates.get(int(one), int(one)) for one in label]) if name == "sleeve" else label
+        labels[name] = np.concatenate([label, image])
     made = Cloth(
-        vertices=np.concatenate([half, anatomy.image(half[off])]),
-        faces=np.concatenate([faces, twin[faces][:, ::-1]]),
+        vertices=np.concatenate([vertices, anatomy.image(vertices[off])]),
+        faces=np.concatenate([half.faces, twin[half.faces][:, ::-1]]),
         values=values,
         labels=labels,
         seams=seams,
@@ -158,7 +146,7 @@ def _between_sides(cloth: Cloth, anatomy: Anatomy) -> FloatArray:
     level = np.clip(((heights - heights.min()) / max(np.ptp(heights), 1e-300) * LEVELS).astype(np.int64), 0, LEVELS - 1)
     farthest = np.zeros(LEVELS)
     np.maximum.at(farthest, level, np.abs(lateral))
-    far = np.flatnonzero(np.abs(lateral) > np.maximum(_FAR * farthest[level], _FADE * anatomy.size))
+    far = np.flatnonzero(np.abs(lateral) > np.maximum(_FAR * farthest[level], BESIDE_LINE * anatomy.size))
     edges = cloth.half_edges.edges.astype(np.int64)
     # Where edges lie in the plane but for rounding, and along seams that keep near to it.
     exact = edges[(np.abs(lateral[edges]) < 1e-6 * anatomy.size).all(axis=1)]
@@ -180,7 +168,7 @@ def _between_sides(cloth: Cloth, anatomy: Anatomy) -> FloatArray:
 
 def _plainly_across(cloth: Cloth, field: FloatArray, lateral: FloatArray, anatomy: Anatomy) -> Ids:
     """Return the vertices near the plane of symmetry in whose surroundings the cloth is steep to it, and goes as a field (#V) rises."""
-    near = _FADE * anatomy.size
+    near = BESIDE_LINE * anatomy.size
     corners, normals = cloth.vertices[cloth.faces], cloth.face_normals
     # Of a linear function, by the edges opposite to the corners, each turned by a right angle.
     turned = np.cross(normals[:, None], np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1))

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,6 @@ __all__ = [
     "BESIDE",
     "FACING",
     "LEFT",
-    "Fields",
     "centre_lines",
     "cut_as_a_tailor",
     "draw_fields",
@@ -52,26 +50,13 @@ _NECK = 0.35
 FACING, LEFT = "front", "left"
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Fields:
-    """The cloth with its fields, and the normals by which they were drawn.
-
-    Attributes:
-        cloth: with values "front", "left", and "sleeve 0" and so on.
-        sleeves: the limb of each sleeve's field.
-    """
-
-    cloth: Cloth
-    sleeves: Mapping[str, Limb]
-
-
 def side_word(side: float) -> str:
     """Return "left" for a positive number, else "right"."""
     return "left" if side > 0 else "right"
 
 
-def draw_fields(cloth: Cloth, anatomy: Anatomy) -> Fields:
-    """Draw the fields whose zero lines are seams, symmetric where the garment is."""
+def draw_fields(cloth: Cloth, anatomy: Anatomy) -> Cloth:
+    """Return the cloth with the fields whose zero lines are seams: front, left, "sleeve 0" and so on; symmetric where the garment is."""
     size, mirror = anatomy.size, anatomy.mirror
     normal = cloth.smooth(cloth.vertex_normals, _SMOOTH * size)
     facing = normal @ anatomy.front / np.maximum(np.linalg.norm(normal, axis=1), 1e-3)
@@ -90,13 +75,8 @@ def draw_fields(cloth: Cloth, anatomy: Anatomy) -> Fields:
     centre = centre[np.abs(facing[centre]) > FACES]
     front = cloth.solve(centre, np.sign(facing[centre]), data=facing, length=2.0 * _SMOOTH * size)
     front = front if mirror is None else mirror.symmetrised(front)
-    values = {**cloth.values, FACING: front, LEFT: left}
-    sleeves = {}
-    for number, limb in enumerate(anatomy.limbs_of("sleeve")):
-        if number in armholes:
-            values[f"sleeve {number}"] = armholes[number]
-            sleeves[f"sleeve {number}"] = limb
-    return Fields(cloth=replace(cloth, values=values), sleeves=sleeves)
+    sleeves = {f"sleeve {number}": field for number, field in armholes.items()}
+    return cloth.with_values(**{FACING: front, LEFT: left}, **sleeves)
 
 
 def _around_limbs(facing: FloatArray, cloth: Cloth, anatomy: Anatomy, armholes: Mapping[int, FloatArray]) -> FloatArray:
@@ -219,13 +199,26 @@ def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> 
     return (offsets[0], middles[0]) if offsets else bare
 
 
-def cut_as_a_tailor(fields: Fields, anatomy: Anatomy, *, hood: bool = True) -> tuple[Cloth, list[str]]:
+def _sleeves(cloth: Cloth, anatomy: Anatomy) -> Iterator[tuple[int, str, Limb]]:
+    """Yield the number, the field and the limb of each sleeve that has one."""
+    for number, limb in enumerate(anatomy.limbs_of("sleeve")):
+        if f"sleeve {number}" in cloth.values:
+            yield number, f"sleeve {number}", limb
+
+
+def cut_as_a_tailor(cloth: Cloth, anatomy: Anatomy, *, hood: bool = True) -> tuple[Cloth, list[str]]:
     """Return the cloth cut where a tailor would cut it, and notes; a hood in one with the trunk if it is not to be cut off.
 
     Its faces have the label "sleeve": the number of the sleeve, or -1.
+
+    Args:
+        cloth: with its fields (see `draw_fields`).
+        anatomy: of the garment.
+        hood: whether it is cut off.
     """
-    cloth, notes = with_drawn_sleeves(fields, anatomy), list[str]()
-    for number, (name, limb) in enumerate(fields.sleeves.items()):
+    cloth, notes = with_drawn_sleeves(cloth, anatomy), list[str]()
+    sleeves = list(_sleeves(cloth, anatomy))
+    for number, name, limb in sleeves:
         if number in cloth.labels["sleeve"]:
             continue
         cut = _cut_armhole(cloth, anatomy, name, limb, number)
@@ -241,11 +234,11 @@ def cut_as_a_tailor(fields: Fields, anatomy: Anatomy, *, hood: bool = True) -> t
         for name, edges in centre.items():
             if len(edges):
                 cloth = cloth.with_seam(name, edges)
-    for number in range(-1, len(fields.sleeves)):
+    for number in range(-1, len(anatomy.limbs_of("sleeve"))):
         cloth = cloth.without_islands(FACING, cloth.labels["sleeve"] == number)
     cloth, ahead, _ = cloth.split(FACING, np.ones(len(cloth.faces), dtype=bool))
     trunk = cloth.labels["sleeve"] < 0
-    armpits = [float(limb.fork @ anatomy.up) for limb in fields.sleeves.values()]
+    armpits = [float(limb.fork @ anatomy.up) for _, _, limb in sleeves]
     # Above the middle of the armholes a line is a shoulder where there are no sleeves.
     bare = [float(border.middle @ anatomy.up) for border in anatomy.borders if border.role == "sleeve"]
     upper = float(np.mean(bare)) if bare else np.inf
@@ -274,7 +267,7 @@ def cut_as_a_tailor(fields: Fields, anatomy: Anatomy, *, hood: bool = True) -> t
     low = np.unique(
         np.concatenate([part.ravel() for word, part in ends if word in ("side", "inseam")] or [np.empty(0, np.int64)])
     )
-    for number, limb in enumerate(fields.sleeves.values()):
+    for number, _, limb in sleeves:
         if number not in cloth.labels["sleeve"]:
             continue
         cloth = _open_sleeve(cloth, ahead, number, limb, low, anatomy)
@@ -288,18 +281,17 @@ def centre_lines(cloth: Cloth) -> tuple[Cloth, dict[str, Ids]]:
     return cloth, {"centre front": edges[ahead], "centre back": edges[~ahead]}
 
 
-def with_drawn_sleeves(fields: Fields, anatomy: Anatomy, *, anywhere: bool = False) -> Cloth:
+def with_drawn_sleeves(cloth: Cloth, anatomy: Anatomy, *, anywhere: bool = False) -> Cloth:
     """Return the cloth with the label "sleeve": the number of the sleeve that seams have cut off already, or -1.
 
     Args:
-        fields: with the cloth.
+        cloth: with its fields (see `draw_fields`).
         anatomy: of the garment.
         anywhere: whether a sleeve may begin elsewhere than near its armhole, and with some of the neck, as a raglan sleeve does.
     """
-    cloth, part = fields.cloth, fields.cloth.parts
-    label = np.full(len(cloth.faces), -1, dtype=np.int64)
+    part, label = cloth.parts, np.full(len(cloth.faces), -1, dtype=np.int64)
     whole = np.bincount(part, cloth.face_areas)
-    for number, (name, limb) in enumerate(fields.sleeves.items()):
+    for number, name, limb in _sleeves(cloth, anatomy):
         rim = anatomy.borders[limb.border].vertices
         if anywhere:
             # Parts that lie outside of the armhole, most of them: a cuff does, and the sleeve above it.
@@ -313,7 +305,7 @@ def with_drawn_sleeves(fields: Fields, anatomy: Anatomy, *, anywhere: bool = Fal
         near = anywhere or (len(line) > 0 and np.abs(cloth.values[name][line]).mean() <= BESIDE * anatomy.size)
         if len(line) and near and most <= (_NECK if anywhere else 0.0):
             label[own] = number
-    return replace(cloth, labels={**cloth.labels, "sleeve": label})
+    return cloth.with_labels(sleeve=label)
 
 
 def _cut_armhole(cloth: Cloth, anatomy: Anatomy, name: str, limb: Limb, number: int) -> Cloth | None:

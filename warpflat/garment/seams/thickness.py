@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from warpflat.core import BoolArray, format_count, unit
 from warpflat.flat import join_labels
 from warpflat.garment.seams.anatomy import HOLE, RING, Border
-from warpflat.garment.seams.cloth import Cloth
+from warpflat.garment.seams.cloth import BESIDE_LINE, Cloth
 
 __all__ = ["even_line", "without_thickness"]
 
@@ -22,9 +22,8 @@ _ACROSS, _RIM, _UPRIGHT = 0.9, 0.025, 0.85
 _WIDEST = 0.15
 # What takes more than this share of a piece that the user has drawn is that piece, as a waistband, and is worn as it lies.
 _PIECE = 0.5
-# The line where it ends is evened over this share of the garment's size, and lies within so much of where it was; a line that strays
-# from it by no more than the third is even.
-_EVEN, _REACH, _RAGGED = 0.03, 0.05, 0.004
+# The line where it ends is evened over this share of the garment's size; one that strays from it by no more than the second is even.
+_EVEN, _RAGGED = 0.03, 0.004
 
 
 def without_thickness(cloth: Cloth) -> tuple[Cloth, list[str]]:
@@ -44,20 +43,10 @@ def without_thickness(cloth: Cloth) -> tuple[Cloth, list[str]]:
     if not openings or drop.mean() > 0.5:
         return cloth, []
     cloth, drop = even_line(cloth, drop, size)
-    kept = replace(cloth, faces=cloth.faces[~drop])
-    part = replace(kept, seams={}).parts
-    kept = replace(kept, faces=kept.faces[part == np.bincount(part).argmax()])
-    used, place = np.unique(kept.faces, return_inverse=True)
     area_out = 1e4 * float(cloth.face_areas[drop].sum())
-    number = np.full(len(cloth.vertices), -1, dtype=np.int64)
-    number[used] = np.arange(len(used))
-    seams = {name: number[edges] for name, edges in cloth.seams.items()}
-    made = Cloth(
-        vertices=cloth.vertices[used],
-        faces=place.reshape(-1, 3).astype(np.int64),
-        seams={name: edges[(edges >= 0).all(axis=1)] for name, edges in seams.items()},
-    )
-    return made, [
+    kept = cloth.only(~drop)
+    part = replace(kept, seams={}).parts
+    return kept.only(part == np.bincount(part).argmax()), [
         f"cloth turned inside at {format_count(openings, 'opening')} ({area_out:.0f} cm2) left out: it is drawn thickness"
     ]
 
@@ -83,7 +72,7 @@ def even_line(cloth: Cloth, drop: BoolArray, size: float) -> tuple[Cloth, BoolAr
     ragged = stray > _RAGGED * size
     if not ragged.any():
         return cloth, drop
-    near = ((np.abs(away) < _REACH * size) & ragged[own[nearest]])[cloth.faces].any(axis=1)
+    near = ((np.abs(away) < BESIDE_LINE * size) & ragged[own[nearest]])[cloth.faces].any(axis=1)
     marked = replace(cloth, values={"turned": level}, labels={"turned": drop.astype(np.int64)})
     made, outside, near = marked.split("turned", near)
     dropped = np.where(near, ~outside, made.labels["turned"] > 0)
