@@ -13,13 +13,14 @@ from typing import Any, Protocol
 from warpflat.app.scene.cuts import scene_with
 from warpflat.app.scene.ledger import with_cut
 from warpflat.app.scene.load import Scene, scene_fabric
+from warpflat.app.scene.schema import DrapeTable
 from warpflat.app.studio.frame import PieceFrame, Watch
 from warpflat.app.studio.save import Saved, run_saved, scene_file, write_scene
 from warpflat.app.studio.solve import Solution, solve
 from warpflat.app.studio.worker import Job, Superseded, Ticket
 from warpflat.core import InputError, activity_listener, one_line, system_reason
 from warpflat.flat import relaxation
-from warpflat.garment import Drape, DrapeOptions, drape
+from warpflat.garment import Drape, drape
 
 __all__ = ["Preview", "Runner", "Session", "Step"]
 
@@ -192,7 +193,7 @@ class Session:
         if table is None:
             self.tell("the scene has no body; its [surface] is as large as its mesh")
             return
-        given = table.model_dump(exclude_unset=True, by_alias=True)
+        given = table.given()
         if size is not None:
             given = {key: value for key, value in given.items() if key not in ("measurements", "scan", "table")}
             self.change("size", mannequin={**given, "size": size})
@@ -306,12 +307,9 @@ class Session:
                 if not ticket.go_on():
                     raise Superseded
 
-            table = step.scene.settings.drape
-            options = None
-            if table is not None:
-                options = DrapeOptions(friction=table.friction, tolerance=table.tolerance, max_steps=table.max_steps)
+            table = step.scene.settings.drape or DrapeTable()
             garment = solution.garment or next(iter(solution.pieces.values()))
-            step.drape = drape(garment, hold=() if table is None else table.hold, options=options, callback=go_on)
+            step.drape = drape(garment, hold=table.hold, options=table.options(), callback=go_on)
             if not step.drape.converged:
                 self.note = (
                     'the drape is not at rest; cloth that slips off is held by the scene, as [drape] hold = ["waist"]'
