@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from warpflat.garment import FoundSeams, GarmentFile, SeamCut
     from warpflat.pattern import FoundSeam
 
-__all__ = ["NO_PATTERN", "found_seams", "plain_panel", "read_edges", "seams_entry"]
+__all__ = ["NO_PATTERN", "found_seams", "plain_panel", "read_edges", "seams_entry", "waist_of_body"]
 
 #: More than this share of the cloth beyond its limit is no pattern yet.
 NO_PATTERN = 0.1
@@ -56,7 +56,6 @@ def found_seams(scene: Scene) -> FoundSeams | None:
     Raises:
         InputError: the file is wrong.
     """
-    from warpflat.app.scene.body_waist import waist_of_body
     from warpflat.flat import FILE_SEAMS, file_seams, like_cut_pieces, object_parts
     from warpflat.garment import SeamOptions, find_seams, read_garment
 
@@ -150,6 +149,28 @@ def found_seams(scene: Scene) -> FoundSeams | None:
     if drawn:
         why = "one piece cannot lie flat, so other seams were found, too; --seams none makes no others than you have drawn"
     return replace(found, notes=(why, *notes, *found.notes))
+
+
+def waist_of_body(path: Path, scale: float) -> tuple[float, float, float]:
+    """Return a place at the height of a body's waist [m], as its file has the body.
+
+    Args:
+        path: of a mesh of a standing body, which is where the garment is worn.
+        scale: metres per unit of the file.
+
+    Raises:
+        InputError: the file cannot be read as a mesh, or the mesh is no standing body.
+    """
+    from warpflat.flat import read_scan
+    from warpflat.garment import Slicer, common_body_of_scan, finer_body
+
+    vertices, faces = read_scan(path)
+    with errors_named(str(path)):
+        body = common_body_of_scan(vertices, faces, name=path.stem)
+    cut = Slicer(body.vertices, finer_body()[1]).cut(np.array([0.0, 1.0, 0.0]), body.level("waist"))
+    trunk = max((part.points for part in cut), key=lambda points: float(np.ptp(points[:, 0])))
+    x, y, z = (scale * ((trunk.mean(axis=0) - body.shift) @ np.linalg.inv(body.turn))).tolist()
+    return x, y, z
 
 
 def _asked_of_file(path: Path, find: str, seams: Mapping[str, FileSeams]) -> FileSeams:

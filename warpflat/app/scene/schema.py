@@ -76,12 +76,15 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class CutPlane(PlaneTable):
-    """A plane through a point [m], as given and all through; of several curves the nearest to the point.
+    """A plane by a point on it [m] and its normal (any length), along which a piece or a garment is cut.
 
-    With `towards` only the part from the point, which then lies on the piece, in that direction to the border.
+    Of a piece, of several curves the nearest to the point is cut, all through; with `towards` only the part from the point, which then
+    lies on the piece, in that direction to the border. Of a garment all curves in which the plane meets it are cut; with `towards` only
+    those in the half of the plane that lies in this direction from the point, with `nearest` only the one that is the nearest to it.
     """
 
     towards: Point | None = None
+    nearest: bool = False
 
 
 class CutTable(Table):
@@ -171,6 +174,8 @@ class CutTable(Table):
             raise ValueError("part takes a part of a line; give line")
         if self.through and self.from_ is None:
             raise ValueError("through lists places between from and to; give both")
+        if self.plane is not None and self.plane.nearest:
+            raise ValueError("plane: of a piece the nearest curve is cut anyway; leave nearest out")
         return self
 
 
@@ -327,17 +332,6 @@ class FindSeamsTable(Table):
     """A mesh file of the body under the garment, in the same place and unit: a seam at the waist is made at the body's waist."""
 
 
-class SeamCutPlane(PlaneTable):
-    """A plane by a point on it [m] and its normal (any length); all curves in which it meets the garment are cut.
-
-    With `towards` only the half of it that lies in this direction from the point, with `nearest` only the curve that is the nearest to
-    the point.
-    """
-
-    towards: Point | None = None
-    nearest: bool = False
-
-
 class SeamCutTable(Table):
     """A seam of a whole garment that you draw (see `warpflat.SeamCut`), in one of five ways.
 
@@ -352,7 +346,7 @@ class SeamCutTable(Table):
     line: TextOr[Points] | None = None
     closed: bool = False
     """Points and lines return to their first point."""
-    plane: SeamCutPlane | None = None
+    plane: CutPlane | None = None
     edges: TextOr[Annotated[list[Annotated[list[Vertex], Field(min_length=2)]], Field(min_length=1)]] | None = None
     marked: bool = False
 
