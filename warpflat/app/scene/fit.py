@@ -21,7 +21,6 @@ from warpflat.core import (
     InputError,
     aligned,
     atomic_path,
-    is_number,
     listening_to_reads,
     make_file_name,
     make_piece_name,
@@ -57,7 +56,8 @@ _KEPT = 0.01
 _WITHIN, _TOLD = 0.002, 0.01
 # A curve in which a plane meets the cloth is a wrinkle below this share of the longest one.
 _WRINKLE = 0.05
-_LENGTH = re.compile(r"\s*(?P<level>[a-z]+)\s*=\s*(?P<value>[-+0-9.eE]+)\s*(?P<unit>mm|cm|m|in)\s*")
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_LENGTH = re.compile(rf"\s*(?P<level>[a-z]+)\s*=\s*(?P<value>{_NUMBER})\s*(?P<unit>mm|cm|m|in)\s*", re.ASCII)
 _UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 # A texture that may be a normalised one is a pattern where so much of the worn cloth at most is stretched against it, in nine of ten cells.
 _AS_WORN = 0.1
@@ -308,11 +308,8 @@ class FitJob:
             carried.vertices[cKDTree(self.read.raw.vertices * self.read.scale).query(layer.vertices)[1]]
             for layer in layers
         ]
-        starts = np.cumsum([0, *(len(layer.vertices) for layer in layers)])
-        triangles = np.concatenate(
-            [triangulate(layer.faces)[0] + start for layer, start in zip(layers, starts, strict=False)]
-        ).astype(np.int64)
-        closest = Closest(np.concatenate([layer.vertices for layer in layers]), triangles)
+        cloth, triangles = _joined([(layer.vertices, triangulate(layer.faces)[0].astype(np.int64)) for layer in layers])
+        closest = Closest(cloth, triangles)
         everywhere = np.concatenate(now)
 
         def moved(places: Sequence[Any]) -> list[Any]:
@@ -379,12 +376,12 @@ def ease_wishes(texts: Sequence[str]) -> dict[str, float]:
     found: dict[str, float] = {}
     for text in texts:
         match = _LENGTH.fullmatch(text)
-        value = float(match["value"]) * _UNITS[match["unit"]] if match and _is_float(match["value"]) else None
-        if match is None or value is None:
+        if match is None:
             raise InputError(f"--ease {quote_value(text)}: give a level and a length with its unit, as waist=40mm")
         if match["level"] not in EASE_LEVELS:
             raise InputError(f"--ease {quote_value(text)}: level {nearest(match['level'], EASE_LEVELS)}")
-        if not is_number(value) or not _RANGE[0] <= value <= _RANGE[1]:
+        value = float(match["value"]) * _UNITS[match["unit"]]
+        if not _RANGE[0] <= value <= _RANGE[1]:
             raise InputError(f"--ease {quote_value(text)}: ease is from -30 to 400 cm")
         if match["level"] in found:
             raise InputError(f"--ease: {match['level']} is given twice; give it once")
@@ -612,10 +609,3 @@ def _obj_lines(vertices: FloatArray, raw: RawMesh) -> str:
         ]
         lines.append("f " + " ".join(words))
     return "\n".join(lines) + "\n"
-
-
-def _is_float(text: str) -> bool:
-    try:
-        return bool(np.isfinite(float(text)))
-    except ValueError:
-        return False
