@@ -228,19 +228,15 @@ def mannequin_table(source: str, levels: Mapping[str, Level], difference: SizeDi
         levels: by name.
         difference: of a scan to the nearest size.
     """
-    if difference is None:
-        rows = [(name, f"{100 * level.height:.1f} cm", f"{100 * level.girth:.1f} cm") for name, level in levels.items()]
-        return f"{source}\n{aligned(('level', 'height', 'girth'), rows)}"
-    head = ("level", "height", "girth", "section", "height over size", "girth over size")
-    full = [
-        (
-            name, f"{100 * level.height:.1f} cm", f"{100 * level.girth:.1f} cm",
-            "" if level.section is None else f"{100 * level.section:.1f} cm",
-            _more(difference.heights, name), _more(difference.girths, name),
-        )
-        for name, level in levels.items()
-    ]  # fmt: skip
-    return f"{source}; nearest size {difference.size}\n{aligned(head, full)}"
+    head = ["level", "height", "girth"]
+    rows = [[name, f"{100 * level.height:.1f} cm", f"{100 * level.girth:.1f} cm"] for name, level in levels.items()]
+    if difference is not None:
+        source += f"; nearest size {difference.size}"
+        head += ["section", "height over size", "girth over size"]
+        for row, (name, level) in zip(rows, levels.items(), strict=True):
+            section = "" if level.section is None else f"{100 * level.section:.1f} cm"
+            row += [section, _more(difference.heights, name), _more(difference.girths, name)]
+    return f"{source}\n{aligned(head, rows)}"
 
 
 def measures_table(measures: Mapping[str, ScanMeasure], difference: SizeDifference) -> str:
