@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
 from warpflat.app.studio.maps import MAPS, MapScale
@@ -14,9 +14,6 @@ from warpflat.app.studio.solve import Solution
 from warpflat.core import InputError, energy_words
 from warpflat.flat import load_library, relaxation_words
 from warpflat.garment import EASE_PRESETS, form_names, size_names, size_tables
-
-if TYPE_CHECKING:
-    from warpflat.app.studio.page import Page
 
 __all__ = ["Panel", "preview_words"]
 
@@ -31,8 +28,13 @@ _LEAST_OVERLAP = 1e-6  # [m2], below which it is not reported
 class Panel:
     """Builds the panel of a page, and keeps it as the session is."""
 
-    def __init__(self, page: Page, *, name: str) -> None:
-        session = page.session
+    def __init__(self, page: Any, *, name: str) -> None:
+        """
+        Args:
+            page: the :class:`warpflat.app.studio.page.Page` that has it.
+            name: under which the scene is to be saved.
+        """
+        session: Session = page.session
         self._gui, self._session = page.server.gui, session
         self._lines: dict[str, tuple[str, str]] = {}
         self._head = self._gui.add_html("")
