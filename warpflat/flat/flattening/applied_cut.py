@@ -102,10 +102,10 @@ def _drawn(positions: FloatArray, seam: Crack, kind: str, tip_back: float, loops
                 "intake_m": eye.intake,
                 "points_m": [p.tolist() for p in (eye.first_tip, eye.left_point, eye.last_tip, eye.right_point)],
             }
-        x, left, right = mouth_first(positions, seam.left, seam.right)
+        left, right = mouth_first(seam.left, seam.right)
         outline = next(loop for loop in loops if left[0] in loop)
         dart = shape_dart(positions, seam.left, seam.right, outline, tip_back=tip_back)
-        legs = pull_back(x[left], x[right], tip_back)
+        legs = pull_back(positions[left], positions[right], tip_back)
     except InputError as reason:
         return {"not_drawn": str(reason)}
     if are_curved(*legs):
