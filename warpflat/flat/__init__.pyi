@@ -156,9 +156,10 @@ from .surface.io.file_seams import MOST_ISLANDS as MOST_ISLANDS
 from .surface.io.file_seams import FileSeams as FileSeams
 from .surface.io.file_seams import file_seams as file_seams
 from .surface.io.file_seams import like_cut_pieces as like_cut_pieces
+from .surface.io.raw_mesh import ALL_PRIMS as ALL_PRIMS
+from .surface.io.raw_mesh import RawMesh as RawMesh
 from .surface.io.read import POSSIBLE as POSSIBLE
 from .surface.io.read import SUFFIXES as SUFFIXES
-from .surface.io.read import RawMesh as RawMesh
 from .surface.io.read import check_size as check_size
 from .surface.io.read import read_mesh_file as read_mesh_file
 from .surface.io.read import read_scan as read_scan
@@ -173,7 +174,6 @@ from .surface.io.sewn_panels import SewnPanel as SewnPanel
 from .surface.io.sewn_panels import read_sewn_panels as read_sewn_panels
 from .surface.io.sewn_panels import sewn_panels as sewn_panels
 from .surface.io.sewn_panels import with_cuts as with_cuts
-from .surface.io.usd_stage import ALL_PRIMS as ALL_PRIMS
 from .surface.laplacian import cotangent_matrix as cotangent_matrix
 from .surface.mesh import Surface as Surface
 from .surface.mirror import even_sides as even_sides

@@ -14,8 +14,8 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name, make_piece_name
 from warpflat.core.text import area_words, format_count
-from warpflat.flat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file, wrong_size
-from warpflat.flat.surface.io.usd_stage import ALL_PRIMS
+from warpflat.flat.surface.io.raw_mesh import ALL_PRIMS, RawMesh
+from warpflat.flat.surface.io.read import POSSIBLE, check_size, read_mesh_file, wrong_size
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.repair.layers import Layer, overlap_notes, surplus_layers
 from warpflat.flat.surface.repair.meet import MEET, meet_borders

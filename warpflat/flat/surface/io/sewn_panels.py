@@ -14,8 +14,8 @@ from warpflat.core.file_names import make_file_name, make_piece_name
 from warpflat.core.text import format_count
 from warpflat.flat.surface.injective import overlap_area
 from warpflat.flat.surface.io.file_seams import MOST_ISLANDS, file_seams
-from warpflat.flat.surface.io.read import METRES_PER_UNIT, POSSIBLE, RawMesh, check_size, read_mesh_file
-from warpflat.flat.surface.io.usd_stage import ALL_PRIMS
+from warpflat.flat.surface.io.raw_mesh import ALL_PRIMS, RawMesh
+from warpflat.flat.surface.io.read import METRES_PER_UNIT, POSSIBLE, check_size, read_mesh_file
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.repair.validate import make_surface, parts_of_faces
 from warpflat.flat.surface.triangles import triangulate
