@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -113,31 +113,20 @@ def lines_after_cut(lines: Mapping[str, IntArray], faces: IntArray, cut: Cut) ->
     return renumbered
 
 
-def split_pieces(surface: Surface, cut: Cut, *, names: Sequence[str] | None = None) -> tuple[CutPart, ...]:
+def split_pieces(surface: Surface, cut: Cut) -> tuple[CutPart, ...]:
     """Return one surface per connected piece of the cut mesh, in the order of their first faces.
 
-    Where a piece has only one part of a line, the part gets the line's plain name back.
+    Where a piece has only one part of a line, the part gets the line's plain name back. One piece keeps the surface's name; of two the
+    names end in where they lie to each other (.upper/.lower, .left/.right as the wearer sees it, .front/.back for Y up and +Z to the front;
+    .inner/.outer for a hole); more are numbered.
 
     Args:
         surface: the uncut surface.
         cut: made from its faces.
-        names: one per piece. By default one piece keeps the surface's name; of two the names end in where they lie to
-            each other (.upper/.lower, .left/.right as the wearer sees it, .front/.back for Y up and +Z to the front;
-            .inner/.outer for a hole); more are numbered.
-
-    Raises:
-        InputError: if the number of names is not that of the pieces, or a name occurs twice.
     """
     whole = apply_cut(surface, cut)
-    count = cut.component_count
-    if names is None:
-        chosen = _names_by_place(whole, cut)
-    elif len(names) != count or len(set(names)) != count:
-        raise InputError(f"the cut leaves {count} pieces: give {count} different names, got {', '.join(names)!s}")
-    else:
-        chosen = list(names)
     pieces = []
-    for label, name in enumerate(chosen):
+    for label, name in enumerate(_names_by_place(whole, cut)):
         face_index = np.flatnonzero(cut.face_component == label).astype(np.int32)
         faces = whole.faces[face_index]
         used = np.unique(faces[faces >= 0]).astype(np.int32)

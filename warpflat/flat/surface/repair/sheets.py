@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
-from warpflat.flat.surface.connectivity import components, join_labels
+from warpflat.flat.surface.connectivity import components, fan_labels, join_labels, part_fans
 from warpflat.flat.surface.half_edges import HalfEdges, border_edges, paired_half_edges
 
 __all__ = ["THICKEST", "OuterSheet", "face_vectors", "inner_sheets", "outer_sheet", "part_sheets"]
@@ -78,27 +78,9 @@ def part_sheets(vertices: FloatArray, he: HalfEdges) -> tuple[IntArray, IntArray
             joined.append((int(at[one[k]]), int(at[other[k]])))
     plain = np.stack(paired_half_edges(he), axis=1)
     a, b = np.concatenate([plain[he.count[he.edge[plain[:, 0]]] == 2], np.array(joined, dtype=np.int64)]).T
-    opposite = he.tail[a] == he.head[b]
-    fan = join_labels(
-        len(he.tail),
-        np.concatenate([a, he.next[a]]),
-        np.concatenate([np.where(opposite, he.next[b], b), np.where(opposite, b, he.next[b])]),
-    )
-    # Of the fans at a vertex of such an edge the first keeps it; elsewhere all do.
     torn = np.zeros(len(vertices), dtype=bool)
     torn[he.edges[crowded]] = True
-    first = np.unique(fan, return_index=True)[1]
-    vertex = he.tail[first].astype(np.int64)
-    order = np.lexsort((first, vertex))
-    again = np.zeros(len(first), dtype=bool)
-    again[order[1:]] = vertex[order[1:]] == vertex[order[:-1]]
-    extra = np.flatnonzero(again & torn[vertex])
-    new = vertex.copy()
-    new[extra] = len(vertices) + np.arange(len(extra))
-    out = he.faces.copy()
-    out[he.face, he.slot] = new[fan]
-    origin = np.concatenate([np.arange(len(vertices)), vertex[extra]])
-    return out.astype(np.int32), origin.astype(np.int32)
+    return part_fans(he, fan_labels(he, a, b), torn)
 
 
 def _middles(vertices: FloatArray, faces: IntArray) -> FloatArray:

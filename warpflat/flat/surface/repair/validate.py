@@ -19,7 +19,14 @@ from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import check_file_name, check_label
 from warpflat.core.text import area_words, format_count, quote_value
-from warpflat.flat.surface.connectivity import border_loops, components, corner_fans, euler_characteristic, orient
+from warpflat.flat.surface.connectivity import (
+    border_loops,
+    components,
+    corner_fans,
+    euler_characteristic,
+    orient,
+    part_fans,
+)
 from warpflat.flat.surface.half_edges import HalfEdges, half_edges
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.repair.polygons import (
@@ -515,27 +522,12 @@ def _separate_touching_fans(mesh: _Mesh) -> None:
     if len(np.unique(tails)) == len(tails) and euler_characteristic(he) == 2 - len(border_loops(he)):
         # With fans apart the characteristic would be greater, and no connected surface has a greater one.
         return
-    fan = corner_fans(he)
-    # Fans are numbered by their first corners.
-    first = np.flatnonzero(np.diff(np.maximum.accumulate(fan), prepend=-1))
-    vertex = he.tail[first]
-    order = np.lexsort((first, vertex))
-    again = np.zeros(len(first), dtype=bool)
-    again[order[1:]] = vertex[order[1:]] == vertex[order[:-1]]
-    if not again.any():
+    faces, origin = part_fans(he, corner_fans(he), np.ones(len(mesh.vertices), dtype=bool))
+    copies = origin[len(mesh.vertices) :]
+    if len(copies) == 0:
         return
-    extra = np.flatnonzero(again)
-    new = np.full(len(first), -1, dtype=np.int64)
-    new[extra] = len(mesh.vertices) + np.arange(len(extra))
-    mesh.vertices = np.vstack([mesh.vertices, mesh.vertices[vertex[extra]]])
-    mesh.index = np.concatenate([mesh.index, mesh.index[vertex[extra]]])
-    of_corner = new[fan]
-    moved = of_corner >= 0
-    faces = mesh.faces.copy()
-    faces[he.face[moved], he.slot[moved]] = of_corner[moved]
-    mesh.faces = faces
-    names = list_some(np.unique(vertex[extra]))
-    mesh.notes.append(f"parts that touched only in a point were separated at vertices {names}")
+    mesh.faces, mesh.vertices, mesh.index = faces, mesh.vertices[origin], mesh.index[origin]
+    mesh.notes.append(f"parts that touched only in a point were separated at vertices {list_some(np.unique(copies))}")
 
 
 def _used_vertices(faces: NDArray[np.integer]) -> NDArray[np.int64]:
