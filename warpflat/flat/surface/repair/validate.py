@@ -105,7 +105,16 @@ class _Mesh:
         return f"{format_count(int(which.sum()), 'face')} of {area_words(float(area))}"
 
     def keep(self, which: BoolArray) -> None:
+        """Drop all faces but these (#F)."""
         self.faces, self.origin = self.faces[which], self.origin[which]
+
+    def drop_unused_vertices(self) -> IntArray:
+        """Drop vertices without a face; return #V, the new number of each that there was, -1 for those dropped."""
+        kept, number = _used_vertices(self.faces), np.full(len(self.vertices) + 1, -1, dtype=np.int32)
+        number[kept] = np.arange(len(kept), dtype=np.int32)
+        if len(kept) < len(self.vertices):
+            self.faces, self.vertices, self.index = number[self.faces], self.vertices[kept], self.index[kept]
+        return number[:-1]
 
 
 def make_surface(
@@ -161,33 +170,16 @@ def make_surface(
             mesh.keep(sheet.faces)
             mesh.notes.append(sheet.describe())
         _separate_touching_fans(mesh)
-        kept = _used_vertices(mesh.faces)
-        if len(kept) < len(mesh.vertices):
-            new = np.full(len(mesh.vertices) + 1, -1, dtype=np.int32)
-            new[kept] = np.arange(len(kept), dtype=np.int32)
-            mesh.faces = new[mesh.faces]
-            mesh.vertices, mesh.index = mesh.vertices[kept], mesh.index[kept]
+        mesh.drop_unused_vertices()
         kept_lines, off = renumber_lines(
             mesh.index, mesh.half_edges.edges, {key: place[path] for key, path in paths.items()}
         )
         mesh.notes += off
         if not closed:
-            loops = border_loops(mesh.half_edges)
-            if not loops:
-                raise ClosedSurfaceError(
-                    "the surface is closed (it has no border): cut the mesh open along a line, its vertices doubled "
-                    "there, or give the part that becomes one piece of cloth; [[cuts]] cut what is flat already"
-                )
-            handles = (2 - len(loops) - euler_characteristic(mesh.half_edges)) // 2
-            if handles:
-                raise InputError(
-                    f"the surface has {format_count(handles, 'handle')} (a tunnel, as where a strap joins two openings): cut it "
-                    "through there, or give a part without"
-                )
+            _require_border(mesh.half_edges)
         mesh.faces, mesh.origin, cut = split_quads(mesh.vertices, mesh.half_edges, mesh.origin, sliver_tolerance)
         for what, which in cut.items():
             mesh.notes.append(f"{format_count(len(which), 'quad')} {what} cut into triangles: {list_some(which)}")
-        before = len(mesh.vertices)
         faces, of, kept_lines, merged, left = merge_degenerate_faces(
             mesh.vertices, mesh.half_edges, kept_lines, sliver_tolerance
         )
@@ -198,18 +190,14 @@ def make_surface(
                 "redraw them"
             )
         if len(merged):
-            names = list_some(np.unique(mesh.origin[merged]))
-            used = len(np.unique(faces[faces >= 0]))
+            names, before = list_some(np.unique(mesh.origin[merged])), len(mesh.vertices)
+            mesh.faces, mesh.origin = faces, mesh.origin[of]
+            number = mesh.drop_unused_vertices()
+            kept_lines = {key: number[line].tolist() for key, line in kept_lines.items()}
             mesh.notes.append(
                 f"{format_count(len(merged), 'degenerate face')} (narrower than {sliver_tolerance:g} of the edges around) merged into "
-                f"neighbours, {before - used} of their vertices fell away: {names}"
+                f"neighbours, {before - len(mesh.vertices)} of their vertices fell away: {names}"
             )
-            mesh.faces, mesh.origin = faces, mesh.origin[of]
-            keep = _used_vertices(faces)
-            new = np.full(before + 1, -1, dtype=np.int32)
-            new[keep] = np.arange(len(keep), dtype=np.int32)
-            kept_lines = {key: new[line].tolist() for key, line in kept_lines.items()}
-            mesh.faces, mesh.vertices, mesh.index = new[faces], mesh.vertices[keep], mesh.index[keep]
         return Surface(
             vertices=np.ascontiguousarray(mesh.vertices),
             faces=np.ascontiguousarray(mesh.faces, dtype=np.int32),
@@ -528,6 +516,22 @@ def _separate_touching_fans(mesh: _Mesh) -> None:
         return
     mesh.faces, mesh.vertices, mesh.index = faces, mesh.vertices[origin], mesh.index[origin]
     mesh.notes.append(f"parts that touched only in a point were separated at vertices {list_some(np.unique(copies))}")
+
+
+def _require_border(he: HalfEdges) -> None:
+    """Refuse a surface without a border, or with a handle."""
+    loops = border_loops(he)
+    if not loops:
+        raise ClosedSurfaceError(
+            "the surface is closed (it has no border): cut the mesh open along a line, its vertices doubled "
+            "there, or give the part that becomes one piece of cloth; [[cuts]] cut what is flat already"
+        )
+    handles = (2 - len(loops) - euler_characteristic(he)) // 2
+    if handles:
+        raise InputError(
+            f"the surface has {format_count(handles, 'handle')} (a tunnel, as where a strap joins two openings): cut it "
+            "through there, or give a part without"
+        )
 
 
 def _used_vertices(faces: NDArray[np.integer]) -> NDArray[np.int64]:
