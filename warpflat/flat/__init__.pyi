@@ -182,6 +182,7 @@ from .surface.mirror import mirror_partners as mirror_partners
 from .surface.mirror import mirror_plane as mirror_plane
 from .surface.normals import area_vectors as area_vectors
 from .surface.normals import face_normals as face_normals
+from .surface.normals import flat_areas as flat_areas
 from .surface.normals import mean_normals as mean_normals
 from .surface.normals import vertex_normals as vertex_normals
 from .surface.overlap import OVERLAP as OVERLAP

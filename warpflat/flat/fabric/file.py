@@ -91,7 +91,7 @@ class CurveTable(_Origin):
         return self
 
     def tensions(self, factor: float) -> Curve:
-        """Return its points with tensions in N/m, by the factor of its unit; of secants, which change evenly from strain to strain, some."""
+        """Return its points with tensions in N/m, by the factor of its unit; secants change evenly from strain to strain."""
         found = [(strain, tension * factor) for strain, tension in self.points or ()]
         for (e0, k0), (e1, k1) in itertools.pairwise(self.secants or []):
             slope = (k1 - k0) / (e1 - e0)

@@ -19,10 +19,10 @@ from warpflat.flat import (
     HalfEdges,
     Surface,
     SurfacePath,
-    area_vectors,
     border_loops,
     components,
     face_normals,
+    flat_areas,
     half_edges,
     join_labels,
     split_faces_along,
@@ -74,7 +74,7 @@ class Cloth:
     @cached_property
     def face_areas(self) -> FloatArray:
         """#F [m2]."""
-        return np.linalg.norm(area_vectors(self.vertices, self.faces), axis=1)
+        return flat_areas(self.vertices, self.faces)
 
     @property
     def face_normals(self) -> FloatArray:

@@ -14,6 +14,7 @@ from warpflat.core.errors import InputError
 from warpflat.flat.surface.cut.cut_mesh import Cut, faces_at
 from warpflat.flat.surface.half_edges import half_edges, sides_of
 from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.normals import flat_areas
 from warpflat.flat.surface.triangles import corner_triangles
 
 __all__ = ["CutPart", "apply_cut", "lines_after_cut", "split_pieces"]
@@ -163,11 +164,10 @@ def _names_by_place(whole: Surface, cut: Cut) -> list[str]:
         inner = int(np.argmin(border))
         return [f"{whole.name}.{'inner' if label == inner else 'outer'}" for label in range(2)]
     triangles, face, weight = corner_triangles(cut.faces)
-    corners = whole.vertices[triangles]
-    area = 0.5 * weight * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    area, middle = weight * flat_areas(whole.vertices, triangles), whole.vertices[triangles].mean(axis=1)
     label = cut.face_component[face]
     total = np.maximum(np.bincount(label, weights=area, minlength=2), np.finfo(float).tiny)
-    moment = [np.bincount(label, weights=area * corners.mean(axis=1)[:, axis], minlength=2) for axis in range(3)]
+    moment = [np.bincount(label, weights=area * middle[:, axis], minlength=2) for axis in range(3)]
     apart = np.array([m[0] / total[0] - m[1] / total[1] for m in moment])
     axis = int(np.argmax(np.abs(apart)))
     # Facing +Z with Y up, the wearer's left hand is at +X.

@@ -102,7 +102,9 @@ def read_obj(path: Path) -> RawMesh:
     )
     if elements:
         # The sides of all polygons in both directions, each as one number: tail * number of vertices + head.
-        a, b = (each[polygons >= 0] for each in (polygons, np.take_along_axis(polygons, following_corners(polygons), 1)))
+        a, b = (
+            each[polygons >= 0] for each in (polygons, np.take_along_axis(polygons, following_corners(polygons), 1))
+        )
         sides = np.unique(np.concatenate([a * len(positions) + b, b * len(positions) + a]))
         for name, row in _line_elements(elements, len(positions)).items():
             if np.isin(row[:-1] * len(positions) + row[1:], sides).all():
@@ -222,7 +224,7 @@ def _texture_of_corners(
 
 
 def _line_elements(rows: list[tuple[str, str, int, int]], total: int) -> dict[str, NDArray[np.int64]]:
-    """Return the line elements joined end to end, by the name of their group, from rows of (group, text, line number, vertices above it)."""
+    """Return the line elements, joined end to end, by the names of their groups; rows are (group, text, line number, vertices above it)."""
     elements: dict[str, list[list[int]]] = {}
     for group, text, line, seen in rows:
         try:

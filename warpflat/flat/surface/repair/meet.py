@@ -17,7 +17,7 @@ from warpflat.core.polyline import arc_lengths
 from warpflat.flat.surface.border_seams import SAME_PLACE
 from warpflat.flat.surface.connectivity import border_loops, join_labels
 from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.repair.sheets import face_vectors
+from warpflat.flat.surface.normals import area_vectors
 
 __all__ = ["MEET", "meet_borders"]
 
@@ -72,9 +72,8 @@ def meet_borders(surfaces: Sequence[Surface], tolerance: float = MEET) -> tuple[
         mine = np.flatnonzero(borders.owner == number)
         vertices = surface.vertices.copy()
         vertices[borders.vertex[mine]] = target[mine]
-        turned = (face_vectors(surface.vertices, surface.faces) * face_vectors(vertices, surface.faces)).sum(
-            axis=1
-        ) <= 0.0
+        before, after = (area_vectors(points, surface.faces) for points in (surface.vertices, vertices))
+        turned = (before * after).sum(axis=1) <= 0.0
         if turned.any():  # a face too small for that
             kept = np.unique(surface.faces[turned])
             vertices[kept[kept >= 0]] = surface.vertices[kept[kept >= 0]]
@@ -133,7 +132,7 @@ class _Borders:
         self._reach = tolerance + 0.5 * float((self._length / steps).max())
 
     def near(self, share: float) -> list[dict[int, tuple[float, int, float]]]:
-        """Return for the place at a share of each edge the nearest place of every border within the tolerance: distance, edge, share of it."""
+        """Return for the place at a share of each edge the nearest place of every border that is near: its distance, edge and share of that."""
         found, length, way = [], self._length, self._way
         places, along = self.points + share * way, self._at + share * length
         for edge, tried in enumerate(self._tree.query_ball_point(places, self._reach)):
@@ -164,7 +163,10 @@ class _Borders:
 
         a, b = cKDTree(self.points).query_pairs(self._tolerance, output_type="ndarray").T
         apart = np.abs(self._at[a] - self._at[b])
-        apart, away = np.minimum(apart, self._around[a] - apart), np.linalg.norm(self.points[a] - self.points[b], axis=1)
+        apart, away = (
+            np.minimum(apart, self._around[a] - apart),
+            np.linalg.norm(self.points[a] - self.points[b], axis=1),
+        )
         own_border = (away <= _OWN * self._tolerance) & (apart > _APART * away + SAME_PLACE)
         least = self._length.copy()
         least[self.after] = np.minimum(least[self.after], self._length)

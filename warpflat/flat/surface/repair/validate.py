@@ -29,6 +29,7 @@ from warpflat.flat.surface.connectivity import (
 )
 from warpflat.flat.surface.half_edges import HalfEdges, half_edges
 from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.normals import flat_areas
 from warpflat.flat.surface.repair.polygons import (
     distinct_corners,
     find_crossed_quads,
@@ -37,7 +38,7 @@ from warpflat.flat.surface.repair.polygons import (
     split_polygons,
     split_quads,
 )
-from warpflat.flat.surface.repair.sheets import THICKEST, face_vectors, outer_sheet, part_sheets
+from warpflat.flat.surface.repair.sheets import THICKEST, outer_sheet, part_sheets
 from warpflat.flat.surface.repair.slivers import merge_degenerate_faces
 from warpflat.flat.surface.repair.weld import t_junction, welding
 
@@ -101,7 +102,7 @@ class _Mesh:
 
     def describe(self, which: BoolArray) -> str:
         """Return how many faces of which area are chosen (#F), in words."""
-        area = np.linalg.norm(face_vectors(self.vertices, self.faces[which]), axis=1).sum()
+        area = flat_areas(self.vertices, self.faces[which]).sum()
         return f"{format_count(int(which.sum()), 'face')} of {area_words(float(area))}"
 
     def keep(self, which: BoolArray) -> None:
@@ -411,7 +412,7 @@ def _choose_component(mesh: _Mesh, component: int | Literal["largest"] | None) -
     label = mesh.part
     sizes = np.bincount(label)
     # By area: a fine button, or a body, may have more faces than the cloth.
-    area = np.bincount(label, np.linalg.norm(face_vectors(mesh.vertices, mesh.faces), axis=1))
+    area = np.bincount(label, flat_areas(mesh.vertices, mesh.faces))
     rank = np.argsort(-np.round(area, 9), kind="stable")
     valid = f'component = "largest" or a number from 0 to {len(sizes) - 1}, by area, largest first'
     if component is None:
@@ -488,13 +489,13 @@ def _part_sheets(mesh: _Mesh) -> None:
     met = np.isin(np.sort(origin[sides], axis=1).astype(np.int64) @ digits, he.edges[crowded].astype(np.int64) @ digits)
     length, own = np.linalg.norm(np.diff(mesh.vertices[sides], axis=1)[:, 0], axis=1), mesh.part[parted.face[alone]]
     border, joined = (np.bincount(own, each, minlength=int(mesh.part.max()) + 1) for each in (length, length * met))
-    area = np.bincount(mesh.part, np.linalg.norm(face_vectors(mesh.vertices, faces), axis=1))
+    area = np.bincount(mesh.part, flat_areas(mesh.vertices, faces))
     walls = (area <= 0.5 * THICKEST * border) & (joined >= _WALL * border) & (border > 0.0)
     left_out = ""
     if walls.any() and not walls.all():
         left_out = f", {format_count(int(walls.sum()), 'wall')} between sheets left out ({area_words(float(area[walls].sum()))})"
         mesh.keep(~walls[mesh.part])
-    areas = np.sort(np.bincount(mesh.part, np.linalg.norm(face_vectors(mesh.vertices, mesh.faces), axis=1)))[::-1]
+    areas = np.sort(np.bincount(mesh.part, flat_areas(mesh.vertices, mesh.faces)))[::-1]
     off = [area_words(area) for area in areas[1 : 1 + max(len(areas) - before, 0)]]
     mesh.notes.append(
         f"{format_count(len(crowded), 'edge')} at which more than two faces meet: the sheets were parted there"
