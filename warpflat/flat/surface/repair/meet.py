@@ -132,7 +132,7 @@ class _Borders:
         self._reach = tolerance + 0.5 * float((self._length / steps).max())
 
     def near(self, share: float) -> list[dict[int, tuple[float, int, float]]]:
-        """Return for the place at a share of each edge the nearest place of every border that is near: its distance, edge and share of that."""
+        """Return for the place at a share of each edge the nearest one of every border that is near: its distance, edge and share."""
         found, length, way = [], self._length, self._way
         places, along = self.points + share * way, self._at + share * length
         for edge, tried in enumerate(self._tree.query_ball_point(places, self._reach)):
