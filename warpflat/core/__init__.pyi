@@ -12,7 +12,6 @@ from .beside import work_beside as work_beside
 from .compile import compile_all_modules as compile_all_modules
 from .compile import launch_quietly as launch_quietly
 from .compile import start_warp as start_warp
-from .environment import require_environment as require_environment
 from .errors import SIGNALS as SIGNALS
 from .errors import CannotWriteError as CannotWriteError
 from .errors import InputError as InputError

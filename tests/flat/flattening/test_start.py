@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from devices import DEVICE
 
+from warpflat.app.scene.read_layout import read_layout
 from warpflat.core.errors import InputError
 from warpflat.flat.flattening.flatten_piece import flatten
 from warpflat.flat.flattening.start import choose_start
 from warpflat.flat.surface.injective import is_injective
-from warpflat.flat.surface.io.read_layout import read_layout
 from warpflat.flat.surface.shapes import make_shape
 
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import click
 
-from warpflat.core import require_environment, require_memory_for_libraries
+from warpflat.app.cli.environment import require_environment
+from warpflat.core import require_memory_for_libraries
 
 __all__ = [
     "BAD_INPUT",

@@ -32,8 +32,8 @@ from warpflat.flat import half_edges, weld_map
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from warpflat.flat import Fabric, FileSeams, Flattening, Surface
-    from warpflat.garment import FoundSeams, GarmentFile, SeamCut
+    from warpflat.flat import Fabric, Flattening, Surface
+    from warpflat.garment import FileSeams, FoundSeams, GarmentFile, SeamCut
     from warpflat.pattern import FoundSeam
 
 __all__ = ["NO_PATTERN", "found_seams", "plain_panel", "read_edges", "seams_entry"]
@@ -57,8 +57,16 @@ def found_seams(scene: Scene) -> FoundSeams | None:
         InputError: the file is wrong.
     """
     from warpflat.app.scene.body_waist import waist_of_body
-    from warpflat.flat import FILE_SEAMS, MOST_ISLANDS, file_seams, like_cut_pieces, object_parts
-    from warpflat.garment import SeamOptions, find_seams, read_garment
+    from warpflat.flat import object_parts
+    from warpflat.garment import (
+        FILE_SEAMS,
+        MOST_ISLANDS,
+        SeamOptions,
+        file_seams,
+        find_seams,
+        like_cut_pieces,
+        read_garment,
+    )
 
     settings, table = scene.settings, scene.settings.surface
     asked, drawn = settings.find_seams, settings.seams_cut
@@ -387,7 +395,8 @@ def plain_panel(scene: Scene) -> Surface | None:
 
     A file whose texture has several islands may bring its seams.
     """
-    from warpflat.flat import file_seams, read_mesh_file
+    from warpflat.flat import read_mesh_file
+    from warpflat.garment import file_seams
 
     settings, table = scene.settings, scene.settings.surface
     if not isinstance(table, FileSurface) or table.component is not None or settings.find_seams or settings.seams_cut:

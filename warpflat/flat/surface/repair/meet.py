@@ -14,13 +14,14 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import arc_lengths
-from warpflat.flat.surface.border_seams import SAME_PLACE
 from warpflat.flat.surface.connectivity import border_loops, join_labels
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.normals import area_vectors
 
-__all__ = ["MEET", "meet_borders"]
+__all__ = ["MEET", "SAME_PLACE", "meet_borders"]
 
+#: Points nearer to each other than this [m] are at one place in space.
+SAME_PLACE = 1e-5
 #: Borders that run along each other within this distance [m] are meant to meet.
 MEET = 1e-3
 # Of one border only places that lie within this share of the tolerance can meet, and further apart along it than so many times that far:

@@ -13,11 +13,8 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.text import format_count
-from warpflat.flat.surface.connectivity import join_labels
-from warpflat.flat.surface.io.raw_mesh import RawMesh, following_corners
-from warpflat.flat.surface.repair.weld import weld_map
+from warpflat.core import BoolArray, FloatArray, format_count
+from warpflat.flat import RawMesh, following_corners, join_labels, weld_map
 
 __all__ = ["FILE_SEAMS", "MOST_ISLANDS", "FileSeams", "file_seams", "like_cut_pieces"]
 

@@ -11,16 +11,17 @@ from itertools import pairwise
 
 import numpy as np
 
-from warpflat.core.arrays import IntArray
-from warpflat.core.polyline import arc_lengths, polyline_length
-from warpflat.flat.flattening.harmonic_layout import harmonic_layout
-from warpflat.flat.flattening.progress import laid_stage
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.solver.steps import Relaxation
-from warpflat.flat.surface.connectivity import border_loops
-from warpflat.flat.surface.normals import flat_areas
-from warpflat.flat.surface.triangles import triangulate
-from warpflat.flat.surface.untangle import signed_cell_areas
+from warpflat.core import IntArray, arc_lengths, polyline_length
+from warpflat.flat import (
+    Flattening,
+    Relaxation,
+    border_loops,
+    flat_areas,
+    harmonic_layout,
+    laid_stage,
+    signed_cell_areas,
+    triangulate,
+)
 
 __all__ = ["Band", "cut_straight", "find_band"]
 

@@ -7,10 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
-from warpflat.core.input_files import FARTHEST, reading
-from warpflat.core.text import quote_value
+from warpflat.core import FARTHEST, FloatArray, InputError, quote_value, reading
 
 __all__ = ["read_layout"]
 
