@@ -103,10 +103,7 @@ from .text import without_side as without_side
 from .threads import thread_count as thread_count
 from .toml_file import Table as Table
 from .toml_file import check_table as check_table
-from .toml_file import document_as_toml as document_as_toml
-from .toml_file import laid_over as laid_over
 from .toml_file import read_toml as read_toml
-from .toml_file import tables_as_toml as tables_as_toml
 from .usd_layers import check_layers as check_layers
 from .usd_process import UNREADABLE as UNREADABLE
 from .usd_process import read_apart as read_apart

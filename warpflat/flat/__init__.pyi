@@ -44,15 +44,10 @@ from .flattening.develop import Development as Development
 from .flattening.develop import develop as develop
 from .flattening.edit import change_fabric as change_fabric
 from .flattening.edit import change_surface as change_surface
-from .flattening.fit_report import RANGES as RANGES
-from .flattening.fit_report import STRAINS as STRAINS
 from .flattening.fit_report import Remedy as Remedy
-from .flattening.fit_report import fit_lines as fit_lines
 from .flattening.fit_report import garment_wear as garment_wear
-from .flattening.fit_report import limit_words as limit_words
-from .flattening.fit_report import pressure_words as pressure_words
+from .flattening.fit_report import no_cut_words as no_cut_words
 from .flattening.fit_report import remedy_words as remedy_words
-from .flattening.fit_report import strain_words as strain_words
 from .flattening.flatten_all import flatten_all as flatten_all
 from .flattening.flatten_piece import check_settings as check_settings
 from .flattening.flatten_piece import flatten as flatten
@@ -74,6 +69,7 @@ from .flattening.verdict import TOO_LARGE as TOO_LARGE
 from .flattening.verdict import Verdict as Verdict
 from .flattening.verdict import judge as judge
 from .model.fit import MAPS as MAPS
+from .model.fit import TOLERATED as TOLERATED
 from .model.fit import TOUCHING as TOUCHING
 from .model.fit import WornFit as WornFit
 from .model.fit import assess_pattern as assess_pattern

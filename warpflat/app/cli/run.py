@@ -99,9 +99,9 @@ def start_warp_silently() -> None:
 
 def report_run(result: SceneResult, folder: Path, *, quiet: bool, verbose: bool, as_json: bool) -> int:
     """Print the result of a run, and return the exit code."""
+    from warpflat.app.cli.fit_lines import fit_lines
     from warpflat.app.cli.summary import notes_line, summary_lines
     from warpflat.app.cli.tables import drape_lines, run_summary, warnings_of
-    from warpflat.flat import fit_lines
 
     warnings = warnings_of(result.metrics)
     if not (quiet or as_json):
