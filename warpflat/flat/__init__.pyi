@@ -114,7 +114,7 @@ from .surface.connectivity import components as components
 from .surface.connectivity import euler_characteristic as euler_characteristic
 from .surface.connectivity import join_labels as join_labels
 from .surface.connectivity import orient as orient
-from .surface.cut.cut_mesh import Crack as Crack
+from .surface.cut.crack import Crack as Crack
 from .surface.cut.dart import fish_eye_measure as fish_eye_measure
 from .surface.cut.dart_legs import are_curved as are_curved
 from .surface.cut.dart_legs import check_tip_back as check_tip_back

@@ -84,7 +84,7 @@ def test_inside_a_flat_mesh_the_way_up_is_exact_for_linear_layouts():
 def test_the_sides_of_a_crack_stay_apart(triangles: bool):
     whole = make_shape("dome", resolution=25, triangles=triangles)
     column = np.arange(25 * 25, dtype=np.int32).reshape(25, 25)[:15, 8]
-    cut = cut_along(whole.faces, column, vertex_count=len(whole.vertices))
+    cut = cut_along(whole.faces, [column], vertex_count=len(whole.vertices))
     surface = make_surface(whole.vertices[cut.vertex_origin], cut.faces)
     layout = surface.vertices[:, :2]
     left = layout[:, 0] < whole.vertices[column[0], 0] - 1e-9

@@ -7,7 +7,7 @@ import pytest
 from cut_meshes import cylinder, edge_set, flat, grid, surface
 
 from warpflat.core.errors import InputError
-from warpflat.flat.surface.cut.cut_mesh import cut_along, cut_along_many
+from warpflat.flat.surface.cut.cut_mesh import cut_along
 from warpflat.flat.surface.cut.pieces import apply_cut, split_pieces
 
 FIVE = surface(
@@ -18,7 +18,7 @@ FIVE = surface(
 
 
 def cut_of(*paths):
-    return cut_along_many(FIVE.faces, paths, vertex_count=25)
+    return cut_along(FIVE.faces, paths, vertex_count=25)
 
 
 def as_lists(lines):
@@ -65,7 +65,7 @@ def test_every_carried_line_runs_along_edges_and_none_of_its_length_is_lost():
 def test_closed_line_around_a_tube_becomes_one_open_line():
     tube = cylinder(6, 3)
     tube = surface(tube.vertices, tube.faces, {"ring": [6, 7, 8, 9, 10, 11, 6]})
-    whole = apply_cut(tube, cut_along(tube.faces, [2, 8, 14], vertex_count=18))
+    whole = apply_cut(tube, cut_along(tube.faces, [[2, 8, 14]], vertex_count=18))
     ring = whole.lines["ring"]
     assert len(ring) == 7
     assert ring[0] != ring[-1]

@@ -18,7 +18,7 @@ from warpflat.flat.flattening.progress import Progress
 from warpflat.flat.flattening.result import Flattening
 from warpflat.flat.solver.options import RelaxOptions, given_options
 from warpflat.flat.surface.cells import LEAST_AREA
-from warpflat.flat.surface.cut.cut_mesh import Crack
+from warpflat.flat.surface.cut.crack import Crack
 from warpflat.flat.surface.cut.dart import dart_measure
 from warpflat.flat.surface.falloff import harmonic_values
 from warpflat.flat.surface.mesh import Surface

@@ -13,7 +13,7 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.flat.surface.connectivity import border_loops
-from warpflat.flat.surface.cut.cut_mesh import Crack
+from warpflat.flat.surface.cut.crack import Crack
 from warpflat.flat.surface.cut.dart import dart_measure, fish_eye_measure, mouth_first, shape_dart, shape_fish_eye
 from warpflat.flat.surface.cut.dart_legs import are_curved, pull_back
 from warpflat.flat.surface.mesh import Surface

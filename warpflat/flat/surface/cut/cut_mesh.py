@@ -19,27 +19,13 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.core.arrays import BoolArray, IndexArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.flat.surface.connectivity import components_of, fan_labels, join_labels, part_fans
+from warpflat.flat.surface.cut.crack import Crack
 from warpflat.flat.surface.half_edges import HalfEdges, half_edges, paired_half_edges
 from warpflat.flat.surface.mesh import Surface
 
-__all__ = ["Crack", "Cut", "CutKind", "cut_along", "cut_along_many", "faces_at"]
+__all__ = ["Cut", "CutKind", "cut_along", "faces_at"]
 
 CutKind = Literal["dart", "slit", "split", "hole", "opening", "network"]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Crack:
-    """The two edges of cloth that one stretch of a cut leaves, matched vertex by vertex.
-
-    Attributes:
-        path: #P, vertices of the uncut mesh, in the direction in which the path was given.
-        left: #P, the vertices of the cut mesh on the left of that direction, seen from outside.
-        right: #P, those on the right. At the tip of a dart left and right are the same vertex.
-    """
-
-    path: IntArray
-    left: IntArray
-    right: IntArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,56 +56,24 @@ class Cut:
     components_before: int
     of_faces: dict[str, Any] = field(default_factory=dict, repr=False)
 
-    @property
-    def seam(self) -> Crack:
-        """The one stretch of a plain cut.
 
-        Raises:
-            ValueError: if the cut has several stretches: then ask for them one by one.
-        """
-        if len(self.seams) != 1:
-            raise ValueError(f"the cut consists of {len(self.seams)} seams, not of one; use Cut.seams")
-        return self.seams[0]
+def cut_along(faces: IntArray, paths: Sequence[ArrayLike], *, vertex_count: int) -> Cut:
+    """Cut a mesh along paths of edges; they may meet, branch and cross in vertices, but share no edge.
 
-    @property
-    def path(self) -> IntArray:
-        """#P, the old vertices along a plain cut."""
-        return self.seam.path
-
-    @property
-    def left(self) -> IntArray:
-        """#P, the new vertices along the left side of a plain cut."""
-        return self.seam.left
-
-    @property
-    def right(self) -> IntArray:
-        """#P, the new vertices along the right side of a plain cut."""
-        return self.seam.right
-
-
-def cut_along(faces: IntArray, path: ArrayLike, *, vertex_count: int) -> Cut:
-    """Cut a mesh along one path of edges.
+    Paths that end on one another need be given in no special order: a path of one edge is fine as long as one of its ends lies on the
+    border or on another path.
 
     Args:
         faces: #F by 4, consistently wound, manifold; -1 in the last column of a triangle.
-        path: #P vertices, each joined to the next by an edge; a closed path repeats its first vertex.
+        paths: each #P vertices, each joined to the next by an edge; a closed path repeats its first vertex.
         vertex_count: #V.
 
     Returns:
         The cut. It conserves faces, their order and winding, and hence every area and length.
 
     Raises:
-        InputError: if the path leaves the mesh, visits a vertex twice, runs along the border, is shorter than one edge,
+        InputError: if a path leaves the mesh, visits a vertex twice, runs along the border, is shorter than one edge,
             or separates nothing (one edge with both ends inside). The message names the vertices.
-    """
-    return cut_along_many(faces, [path], vertex_count=vertex_count)
-
-
-def cut_along_many(faces: IntArray, paths: Sequence[ArrayLike], *, vertex_count: int) -> Cut:
-    """Cut a mesh along several paths at once; they may meet, branch and cross in vertices, but share no edge.
-
-    Arguments, result and errors are those of :func:`cut_along`. Paths that end on one another need be given in no
-    special order: a path of one edge is fine as long as one of its ends lies on the border or on another path.
     """
     chains = [_checked_path(path, vertex_count) for path in paths]
     if not chains:

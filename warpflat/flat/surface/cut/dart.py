@@ -120,7 +120,7 @@ def dart_measure(positions: FloatArray, left: IntArray, right: IntArray) -> Dart
 
     Args:
         positions: #P by 2, the layout [m], not mirrored.
-        left, right: the vertices along both sides of the cut, matched, as a :class:`~warpflat.flat.surface.cut.cut_mesh.Crack` has
+        left, right: the vertices along both sides of the cut, matched, as a :class:`~warpflat.flat.surface.cut.crack.Crack` has
             them: from the border to the tip or from the tip to the border. At the tip both are one vertex.
 
     Raises:
