@@ -307,8 +307,6 @@ def test_sheets_that_touch_in_one_vertex_have_no_coarser_level():
     touching = Surface(
         vertices=vertices,
         faces=np.vstack([left.faces, faces]).astype(np.int32),
-        input_vertices=vertices,
-        input_index=np.arange(len(vertices), dtype=np.int32),
     )
     assert coarsen(touching) is None
 

@@ -25,8 +25,6 @@ def sheet(n: int = 11, *, triangles: bool = False, lines: dict[str, list[int]] |
         vertices=vertices,
         faces=faces.astype(np.int32),
         lines={name: np.array(line, dtype=np.int32) for name, line in (lines or {}).items()},
-        input_vertices=vertices,
-        input_index=np.arange(n * n, dtype=np.int32),
     )
 
 
@@ -75,9 +73,7 @@ def test_a_sliver_does_not_make_the_peak_once_smoothed():
     surface = sheet(triangles=True)
     vertices = surface.vertices.copy()
     vertices[60] = vertices[61] + [-1e-7, 1e-9, 0.0]
-    thin = Surface(
-        vertices=vertices, faces=surface.faces, input_vertices=vertices, input_index=np.arange(121, dtype=np.int32)
-    )
+    thin = Surface(vertices=vertices, faces=surface.faces)
     corner = vertices[thin.faces[:, :3]]
     area = 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     density = 1.0 + 4.0 * np.exp(-np.sum((corner.mean(axis=1) - [0.02, 0.02, 0]) ** 2, axis=1) / 0.01**2)
@@ -91,7 +87,7 @@ def test_a_vertex_without_faces_and_a_face_without_area_have_no_density():
     surface = sheet(3)
     vertices = np.concatenate([surface.vertices, [[1.0, 1.0, 1.0]]])
     faces = np.concatenate([surface.faces, [[0, 0, 0, -1]]]).astype(np.int32)
-    odd = Surface(vertices=vertices, faces=faces, input_vertices=vertices, input_index=np.arange(10, dtype=np.int32))
+    odd = Surface(vertices=vertices, faces=faces)
     for length in (0.0, 0.01):
         smooth = smooth_to_vertices(odd, [1.0, 1.0, 1.0, 1.0, 7.0], smoothing_length=length)
         np.testing.assert_allclose(smooth[:9], 1.0)

@@ -301,7 +301,7 @@ def test_nodes_that_are_joined_have_one_label_and_first_nodes_come_first(nodes, 
 
 def test_half_edges_of_a_surface_are_made_once_and_not_to_be_changed():
     vertices, quads = grid(3, 3)
-    surface = Surface(vertices=vertices, faces=quads, input_vertices=vertices, input_index=np.arange(9, dtype=np.int32))
+    surface = Surface(vertices=vertices, faces=quads)
     he = half_edges_of(surface)
     assert half_edges_of(surface) is he
     for name, values in vars(half_edges(quads)).items():

@@ -19,16 +19,13 @@ __all__ = ["join_networks", "join_surfaces"]
 
 def join_surfaces(surfaces: Sequence[Surface]) -> Surface:
     """Return several surfaces as one, without their lines: vertices and faces of the first, then of the next."""
-    vertices = np.concatenate([surface.vertices for surface in surfaces])
     first = range_offsets([len(surface.vertices) for surface in surfaces])
     return Surface(
-        vertices=vertices,
+        vertices=np.concatenate([surface.vertices for surface in surfaces]),
         faces=np.concatenate(
             [np.where(s.faces >= 0, s.faces + at, -1) for s, at in zip(surfaces, first, strict=False)]
         ),
         name=" + ".join(surface.name for surface in surfaces),
-        input_vertices=vertices,
-        input_index=np.arange(len(vertices), dtype=np.int32),
     )
 
 

@@ -234,8 +234,6 @@ class Cloth:
             vertices=self.vertices,
             faces=np.column_stack([self.faces, np.full(len(self.faces), -1)]).astype(np.int32),
             name="garment",
-            input_vertices=self.vertices,
-            input_index=np.arange(len(self.vertices), dtype=np.int32),
         )
 
     def drawn(self, path: SurfacePath) -> tuple[Cloth, Ids]:

@@ -115,10 +115,7 @@ def cut_along(faces: IntArray, paths: Sequence[ArrayLike], *, vertex_count: int)
         )
     ]
 
-    nowhere = np.empty((0, 3))
-    cut_mesh = Surface(
-        vertices=nowhere, faces=new_faces, name="", input_vertices=nowhere, input_index=np.empty(0, dtype=np.int32)
-    )
+    cut_mesh = Surface(vertices=np.empty((0, 3)), faces=new_faces, name="")
     labels = components_of(cut_mesh)
     after = int(labels.max(initial=-1)) + 1
     # Joined again across the cut, its components are those before it.
