@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from warpflat.flat.surface.connectivity import euler_characteristic, non_manifold_vertices
 from warpflat.flat.surface.cut.cut_mesh import cut_along
 from warpflat.flat.surface.cut.pieces import apply_cut, split_pieces
-from warpflat.flat.surface.half_edges import border_edges, half_edges, non_manifold_edges
+from warpflat.flat.surface.half_edges import border_edges, half_edges
 from warpflat.flat.surface.triangles import corner_triangles
 
 SETTINGS = settings(max_examples=120, deadline=None, derandomize=True, database=None)
@@ -112,7 +112,7 @@ def test_a_cut_conserves_everything_but_the_topology(case):
     np.testing.assert_array_equal(cut.faces < 0, mesh.faces < 0)
     used = np.unique(cut.faces[cut.faces >= 0])
     np.testing.assert_array_equal(used, np.arange(len(cut.vertex_origin)))
-    assert len(non_manifold_edges(cut.faces)) == 0
+    assert half_edges(cut.faces).count.max() <= 2
     assert len(non_manifold_vertices(cut.faces)) == 0
 
     copies = Counter(cut.vertex_origin.tolist())
