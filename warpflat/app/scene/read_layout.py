@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
 
-from warpflat.core import FARTHEST, FloatArray, InputError, quote_value, reading
+from warpflat.core import FARTHEST, FloatArray, InputError
+from warpflat.flat import read_mesh_file
 
 __all__ = ["read_layout"]
-
-_CORNER = re.compile(r"(-?\d+)/(-?\d+)")
 
 
 def read_layout(path: Path) -> FloatArray:
@@ -20,35 +18,17 @@ def read_layout(path: Path) -> FloatArray:
     Raises:
         InputError: the file cannot be read, has no texture coordinates, or parts a vertex in the plane.
     """
-    places: list[list[float]] = []
-    of_vertex: dict[int, int] = {}
-    count = 0
-    with reading(path, "start") as place:
-        for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
-            place.at = f"line {number}"
-            key, _, rest = line.strip().partition(" ")
-            if key == "v":
-                count += 1
-            elif key == "vt":
-                x, y = (float(word) for word in rest.split()[:2])
-                if not abs(x) + abs(y) < FARTHEST:
-                    raise InputError(f"line {number}: {line.strip()[:40]!r} is not 'vt x y' in metres")
-                places.append([x, y])
-            elif key == "f":
-                for vertex, corner in ((int(v), int(t)) for v, t in _CORNER.findall(rest)):
-                    index = vertex - 1 if vertex > 0 else count + vertex
-                    at = corner - 1 if corner > 0 else len(places) + corner
-                    if not (0 <= index < count and 0 <= at < len(places)):
-                        raise InputError(
-                            f"line {number}: corner {quote_value(vertex)}/{quote_value(corner)} is not in the file"
-                        )
-                    before = of_vertex.setdefault(index, at)
-                    if places[before] != places[at]:
-                        raise InputError(
-                            f"line {number}: vertex {index} has two texture coordinates; a start must not be cut"
-                        )
-    if not of_vertex:
-        raise InputError(f"{path}: has no texture coordinates; a start is read from 'vt x y' and faces 'f v/vt'")
-    layout = np.full((count, 2), np.nan)
-    layout[list(of_vertex)] = np.array(places)[list(of_vertex.values())]
+    _, raw, _, _ = read_mesh_file(path, units="m", prim=None, name=None)
+    if raw.texture is None or raw.notes:
+        fault = raw.notes[0] if raw.notes else "has no texture coordinates"
+        raise InputError(f"{path}: {fault}; a start is read from 'vt x y' and faces 'f v/vt'")
+    known = (raw.polygons >= 0) & np.isfinite(raw.texture).all(axis=2)
+    vertex, place = raw.polygons[known], raw.texture[known]
+    if not np.abs(place).sum(axis=1).max() < FARTHEST:
+        raise InputError(f"{path}: its texture coordinates reach beyond {FARTHEST:g}; 'vt x y' are in metres")
+    layout = np.full((len(raw.vertices), 2), np.nan)
+    layout[vertex] = place
+    again = np.flatnonzero((layout[vertex] != place).any(axis=1))
+    if len(again):
+        raise InputError(f"{path}: vertex {vertex[again[0]]} has two texture coordinates; a start must not be cut")
     return layout
