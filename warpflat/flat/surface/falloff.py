@@ -7,12 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.sparse import factor_symmetric
 from warpflat.flat.surface.half_edges import mesh_edges
 
 __all__ = ["falloff_weights", "harmonic_values"]
-
-# What holds a part without any given value at 0, over the weight of one edge.
-_HELD = 1e-9
 
 
 def harmonic_values(faces: IntArray, value: FloatArray, known: BoolArray) -> FloatArray:
@@ -24,15 +22,14 @@ def harmonic_values(faces: IntArray, value: FloatArray, known: BoolArray) -> Flo
         known: #V.
     """
     from scipy.sparse import coo_matrix, diags
-    from scipy.sparse.linalg import spsolve
 
     count, free, found = len(known), np.flatnonzero(~known), value.copy()
     if len(free):
         ends = mesh_edges(faces)
         both = np.concatenate([ends[:, 0], ends[:, 1]]), np.concatenate([ends[:, 1], ends[:, 0]])
         joined = coo_matrix((np.ones(2 * len(ends)), both), shape=(count, count)).tocsr()
-        laplacian = (diags(np.asarray(joined.sum(axis=1)).ravel() + _HELD) - joined).tocsr()
-        found[free] = spsolve(laplacian[free][:, free].tocsc(), joined[free] @ value).reshape(-1, *value.shape[1:])
+        laplacian = (diags(np.asarray(joined.sum(axis=1)).ravel()) - joined).tocsr()
+        found[free] = factor_symmetric(laplacian[free][:, free])(joined[free] @ value)
     return found
 
 
