@@ -73,12 +73,11 @@ from .model.fit import TOLERATED as TOLERATED
 from .model.fit import TOUCHING as TOUCHING
 from .model.fit import WornFit as WornFit
 from .model.fit import assess_pattern as assess_pattern
-from .model.join import join_networks as join_networks
-from .model.join import join_surfaces as join_surfaces
 from .model.membrane import make_cloth as make_cloth
 from .model.membrane import step_matrix as step_matrix
 from .model.network import SpringNetwork as SpringNetwork
 from .model.springs import SpringArrays as SpringArrays
+from .model.springs import SpringsAround as SpringsAround
 from .model.springs import springs_of as springs_of
 from .model.springs import with_stiffness as with_stiffness
 from .model.strain import WornStrain as WornStrain
@@ -148,6 +147,7 @@ from .surface.io.read_pieces import read_pieces as read_pieces
 from .surface.laplacian import cotangent_matrix as cotangent_matrix
 from .surface.laplacian import laplacian_of as laplacian_of
 from .surface.mesh import Surface as Surface
+from .surface.mesh import join_surfaces as join_surfaces
 from .surface.mesh import read_only as read_only
 from .surface.mesh import store_results as store_results
 from .surface.normals import area_vectors as area_vectors
@@ -196,4 +196,5 @@ from .surface.triangles import corner_triangles as corner_triangles
 from .surface.triangles import triangulate as triangulate
 from .surface.tubes import inner_borders as inner_borders
 from .surface.tubes import tube_borders as tube_borders
+from .surface.unfold import VertexLists as VertexLists
 from .surface.untangle import signed_cell_areas as signed_cell_areas

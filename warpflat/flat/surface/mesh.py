@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import wraps
 from pathlib import Path
@@ -12,9 +12,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.sums import range_offsets
 
 __all__ = [
     "Surface",
+    "join_surfaces",
     "once_per_faces",
     "once_per_surface",
     "read_only",
@@ -72,6 +74,18 @@ class Surface:
     def is_quad(self) -> BoolArray:
         """#F, true for quads."""
         return self.faces[:, 3] >= 0
+
+
+def join_surfaces(surfaces: Sequence[Surface]) -> Surface:
+    """Return several surfaces as one, without their lines: vertices and faces of the first, then of the next."""
+    first = range_offsets([len(surface.vertices) for surface in surfaces])
+    return Surface(
+        vertices=np.concatenate([surface.vertices for surface in surfaces]),
+        faces=np.concatenate(
+            [np.where(s.faces >= 0, s.faces + at, -1) for s, at in zip(surfaces, first, strict=False)]
+        ),
+        name=" + ".join(surface.name for surface in surfaces),
+    )
 
 
 def once_per_surface(measure: Callable[[Surface], Result]) -> Callable[[Surface], Result]:

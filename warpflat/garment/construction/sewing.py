@@ -35,7 +35,6 @@ from warpflat.flat import (
     given_options,
     grain_alignments,
     is_injective,
-    join_networks,
     join_surfaces,
     make_stage,
     overlap_area,
@@ -59,6 +58,7 @@ from warpflat.garment.construction.constraints import (
     equations_of_constraint,
     find_piece,
 )
+from warpflat.garment.construction.join_networks import join_networks
 from warpflat.garment.construction.sewn import ConstraintResult, Sewn, Stitching
 
 __all__ = ["sew"]
