@@ -97,14 +97,14 @@ def test_the_folded_dart_ends_at_the_seam(stretch):
     along = (dart.left_end - dart.tip) / np.linalg.norm(dart.left_end - dart.tip)
     offset = dart.fold_point - dart.tip
     landed = dart.tip + 2 * (offset @ along) * along - offset
-    a, b = dart.left_end, positions[4].copy()
-    # The next vertex is 0.1 m away, and the outline follows over eight times the shift.
-    shift = a - positions[crack.left[0]]
+    # The vertices beside it are 0.1 m apart, and the outline follows over eight times the shift.
+    shift = dart.left_end - positions[crack.left[0]]
+    beside = np.array([dart.left_end, *positions[4:1:-1]])
     blend = 8 * float(np.linalg.norm(shift))
-    b += (0.5 + 0.5 * np.cos(np.pi * 0.1 / blend) if blend > 0.1 else 0.0) * shift
-    share = np.clip((landed - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
-    assert 0.0 < share < 1.0
-    assert np.linalg.norm(a + share * (b - a) - landed) < 1e-9
+    beside[1] += (0.5 + 0.5 * np.cos(np.pi * 0.1 / blend) if blend > 0.1 else 0.0) * shift
+    a, b = beside[:-1], beside[1:]
+    share = np.clip(np.einsum("ij,ij->i", landed - a, b - a) / np.einsum("ij,ij->i", b - a, b - a), 0.0, 1.0)
+    assert np.linalg.norm(a + share[:, None] * (b - a) - landed, axis=1).min() < 1e-9
     middle = 0.5 * (dart.left_end + dart.right_end) - dart.tip
     assert abs(offset[0] * middle[1] - offset[1] * middle[0]) < 1e-12
 
