@@ -31,6 +31,7 @@ from .file_names import make_piece_name as make_piece_name
 from .file_names import plain_label as plain_label
 from .file_names import plain_name as plain_name
 from .file_names import same_file as same_file
+from .file_names import with_plain_letters as with_plain_letters
 from .input_files import FARTHEST as FARTHEST
 from .input_files import Place as Place
 from .input_files import check_values as check_values
@@ -87,6 +88,7 @@ from .sums import range_offsets as range_offsets
 from .sums import weighted_percentile as weighted_percentile
 from .sums import weighted_percentiles as weighted_percentiles
 from .text import MADE_TO_MEASURE as MADE_TO_MEASURE
+from .text import aligned as aligned
 from .text import area_words as area_words
 from .text import control_in as control_in
 from .text import energy_words as energy_words

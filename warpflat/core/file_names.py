@@ -16,6 +16,7 @@ __all__ = [
     "plain_label",
     "plain_name",
     "same_file",
+    "with_plain_letters",
 ]
 
 # Hidden beginnings, separators and drives lead elsewhere; the others Windows refuses.
@@ -70,6 +71,11 @@ def make_piece_name(name: str) -> str:
     return make_file_name(name).replace(".", "_")
 
 
+def with_plain_letters(name: str, others: str = "_.-") -> str:
+    """Return a name of plain letters that is like another one: "Ärmel (1)" becomes "Armel_1"; it may be empty."""
+    return re.sub(rf"[^A-Za-z0-9{re.escape(others)}]+", "_", plain_letters(name)).strip(others)
+
+
 def plain_name(name: str, others: str = " _.-") -> str:
     """Return the name of a scene or cut if it has plain letters only, since it is typed in a shell and part of other names.
 
@@ -78,7 +84,7 @@ def plain_name(name: str, others: str = " _.-") -> str:
     """
     if re.fullmatch(rf"[A-Za-z0-9][A-Za-z0-9{re.escape(others)}]*", name):
         return name
-    better = re.sub(rf"[^A-Za-z0-9{re.escape(others)}]+", "_", plain_letters(name)).strip(others)
+    better = with_plain_letters(name, others)
     hint = f"; {quote_value(better)} would do" if better else ""
     raise ValueError(
         f"{quote_value(name)} cannot name files: it must begin with one of a to z, A to Z, 0 to 9, and may have besides them only "

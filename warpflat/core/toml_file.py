@@ -31,6 +31,14 @@ class Table(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
+    def given(self) -> dict[str, Any]:
+        """Return what the file says, by its own keys; without what holds by default."""
+        return self.model_dump(exclude_unset=True, by_alias=True)
+
+    def metres(self, *keys: str) -> dict[str, Any]:
+        """Return lengths [m] by name: "width" of the field `width_mm`."""
+        return {key: 1e-3 * getattr(self, f"{key}_mm") for key in keys}
+
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Read the tables of a file.

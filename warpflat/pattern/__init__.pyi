@@ -56,6 +56,7 @@ from .drafting.worn import Worn as Worn
 from .export.colours import DRAFTED_CLOTH as DRAFTED_CLOTH
 from .export.colours import ENERGY as ENERGY
 from .export.colours import LEAST_GAP as LEAST_GAP
+from .export.colours import LEAST_PRESSURE as LEAST_PRESSURE
 from .export.colours import SKIN as SKIN
 from .export.colours import SMALLEST_SCALE as SMALLEST_SCALE
 from .export.colours import Scale as Scale

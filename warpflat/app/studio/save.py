@@ -78,7 +78,7 @@ def write_scene(scene: Scene, name: str, *, replace: bool = False) -> Path:
     path = scene_file(scene, name)
     if path.exists() and not replace:
         raise InputError(f"{path}: there is such a file; choose to replace it, or give another name")
-    text = document_as_toml(scene.settings.model_dump(exclude_unset=True, by_alias=True))
+    text = document_as_toml(scene.settings.given())
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return path

@@ -76,7 +76,7 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
     for side in sides:
         if isinstance(side, Side) and side.kind == "fold":
             # Keep what lies on the piece's side of its fold.
-            half = half_plane(side.points[0], side.points[-1], body)
+            half = half_plane(side.points[0], side.points[-1], body.length + 2.0)
             over = float(shapely.distance(half, shapely.points(shapely.get_coordinates(body))).max())
             if over > FOLD_STRAIGHT:
                 raise InputError(

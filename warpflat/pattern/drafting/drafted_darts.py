@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, arc_lengths
+from warpflat.core import FloatArray, resample
 from warpflat.flat import are_curved
-from warpflat.pattern.drafting.curves import TOLERANCE, fit_curve
+from warpflat.pattern.drafting.curves import TOLERANCE, farthest, fit_curve
 from warpflat.pattern.drafting.dart_allowance import WIDEST_DART
 from warpflat.pattern.drafting.drafted import DraftedDart, DraftedEdge, drawn_leg
-from warpflat.pattern.drafting.piece_parts import SAME_POINT, Dart
+from warpflat.pattern.drafting.piece_parts import DEFAULT_ALLOWANCE, SAME_POINT, Dart
 from warpflat.pattern.drafting.pieces import Piece
 from warpflat.pattern.drafting.seam_difference import SEAM_TOLERANCE
 from warpflat.pattern.drafting.sides import Wedge
@@ -20,9 +20,8 @@ from warpflat.pattern.drafting.sides import Wedge
 __all__ = ["DartLegs", "dart_legs", "dart_line", "dart_notes", "fisheye_legs", "smooth_fisheye"]
 
 
-#: Allowance [m] of the legs of a dart that is cut away, where they name none, and the least width between both
-#: allowances.
-LEG_ALLOWANCE, LEAST_WASTE = 0.010, 0.005
+#: The least width [m] between the allowances of both legs of a dart that is cut away.
+LEAST_WASTE = 0.005
 #: Points of the fold between curved legs.
 FOLD_POINTS = 33
 
@@ -50,12 +49,7 @@ class DartLegs:
     @property
     def bend(self) -> float:
         """Largest distance of a leg from its chord [m]."""
-        import shapely
-
-        return max(
-            float(shapely.distance(shapely.LineString(e.line[[0, -1]]), shapely.points(e.line)).max())
-            for e in (self.left, self.right)
-        )
+        return max(farthest(leg.line[[0, -1]], leg.line) for leg in (self.left, self.right))
 
 
 def dart_legs(piece: Piece, edges: Sequence[DraftedEdge]) -> dict[str, DartLegs]:
@@ -85,7 +79,7 @@ def dart_legs(piece: Piece, edges: Sequence[DraftedEdge]) -> dict[str, DartLegs]
 
 
 def _leg_width(leg: DraftedEdge) -> float:
-    return LEG_ALLOWANCE if leg.edge.allowance is None else leg.edge.allowance
+    return DEFAULT_ALLOWANCE["seam"] if leg.edge.allowance is None else leg.edge.allowance
 
 
 def dart_line(legs: DartLegs, cut_line: FloatArray) -> DraftedDart:
@@ -105,11 +99,7 @@ def dart_line(legs: DartLegs, cut_line: FloatArray) -> DraftedDart:
     if are_curved(left, right):
         # The middle line of two lines with one start, by shares of their lengths.
         shares = np.linspace(0.0, 1.0, FOLD_POINTS)
-        sides = [
-            np.column_stack([np.interp(shares * arc[-1], arc, line[:, k]) for k in (0, 1)])
-            for line, arc in ((line, arc_lengths(line)) for line in (left[::-1], right))
-        ]
-        fold = np.concatenate([np.asarray((sides[0] + sides[1]) / 2), fold[1:]])
+        fold = np.concatenate([(resample(left[::-1], shares) + resample(right, shares)) / 2, fold[1:]])
     if legs.dart.pleat is not None:
         fold = drawn_leg(fold[::-1], legs.dart.pleat)[::-1]
     return DraftedDart(dart=legs.dart, tip=wedge.tip, fold=fold, fold_to=wedge.fold_to, opening=legs.mouth)

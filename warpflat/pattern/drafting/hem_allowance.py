@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray
+from warpflat.core import FloatArray, polyline_length
 from warpflat.pattern.drafting.polygons import (
     cut_off,
     difference,
     intersection,
+    normal_towards,
     parallelogram,
     reflect,
+    turn_between,
     union,
     unit_vector,
 )
@@ -57,23 +59,22 @@ def find_hem_end(sides: Sequence[Side | Wedge], index: int, after: int) -> HemEn
     if not isinstance(side, Side) or not isinstance(follows, Side) or {side.kind, follows.kind} != {"hem", "seam"}:
         return None
     a, b = unit_vector(side.points[-1] - side.points[-2]), unit_vector(follows.points[1] - follows.points[0])
-    turn = float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
-    if abs(turn - np.pi / 2) >= HEM_SLANT:
+    if abs(turn_between(a, b) - np.pi / 2) >= HEM_SLANT:
         return None
-    corner = side.points[-1]
-    if side.kind == "hem":
-        hem, seam = side, follows
-        end = HemEnd(
-            corner=corner, hem=index, seam=after, inwards=-a, beyond=-b, hem_width=hem.width, seam_width=seam.width
-        )
-    else:
-        hem, seam = follows, side
-        end = HemEnd(
-            corner=corner, hem=after, seam=index, inwards=b, beyond=a, hem_width=hem.width, seam_width=seam.width
-        )
+    ends = ((index, side, -a), (after, follows, b))
+    (hem, hem_side, inwards), (seam, seam_side, along) = ends if side.kind == "hem" else ends[::-1]
     # Beside a seam that is shorter than the hem is deep there is nothing to mirror.
-    room = float(np.linalg.norm(np.diff(seam.points, axis=0), axis=1).sum())
-    return end if seam.width > 0 and 0 < hem.width <= room else None
+    if not (seam_side.width > 0 and 0 < hem_side.width <= polyline_length(seam_side.points)):
+        return None
+    return HemEnd(
+        corner=side.points[-1],
+        hem=hem,
+        seam=seam,
+        inwards=inwards,
+        beyond=-along,
+        hem_width=hem_side.width,
+        seam_width=seam_side.width,
+    )
 
 
 def fold_hem(end: HemEnd, strips: list[Geometry], body: Polygon, far: Geometry) -> list[Geometry]:
@@ -90,10 +91,7 @@ def fold_hem(end: HemEnd, strips: list[Geometry], body: Polygon, far: Geometry) 
     """
     corner, inwards, beyond, hem, seam = end.corner, end.inwards, end.beyond, end.hem, end.seam
     width, hem_width = end.seam_width, end.hem_width
-    down = np.array([inwards[1], -inwards[0]])
-    down = down if down @ beyond > 0 else -down
-    out = np.array([beyond[1], -beyond[0]])
-    out = out if out @ inwards < 0 else -out
+    down, out = normal_towards(inwards, beyond), normal_towards(beyond, -inwards)
     reach = hem_width + MITRE_REACH * width
     run_on = parallelogram(corner, beyond, (0, reach), out, (0, width))
     run_on = intersection(run_on, parallelogram(corner, inwards, (-3 * reach, reach), -down, (0, 3 * reach)))

@@ -19,7 +19,17 @@ from warpflat.core import BoolArray, FloatArray, IntArray
 if TYPE_CHECKING:
     from shapely import Polygon
 
-__all__ = ["CELL", "Mask", "Places", "TurnedShape", "nest_on_strip", "nest_on_tiles", "orders"]
+__all__ = [
+    "CELL",
+    "Mask",
+    "Places",
+    "TurnedShape",
+    "first_free",
+    "nest_on_strip",
+    "nest_on_tiles",
+    "orders",
+    "touched_cells",
+]
 
 
 #: Cells are about this wide [m], at most.
@@ -83,6 +93,14 @@ class _Grid:
             )
             self._touched[id(mask)] = _covered(mask.cells, rows, columns).astype(np.float32)
         return self._touched[id(mask)]
+
+    def tiles_under(self, mask: Mask, row: int, column: int) -> BoolArray:
+        """Return the tiles that a mask takes at one place."""
+        (i, first), (j, left) = divmod(row, self.per_tile[0]), divmod(column, self.per_tile[1])
+        covered, tiles = self.touched(mask)[first, :, left, :] > 0.0, np.zeros(self.tiles, dtype=bool)
+        part = tiles[i : i + covered.shape[0], j : j + covered.shape[1]]
+        part |= covered[: part.shape[0], : part.shape[1]]
+        return tiles
 
 
 def nest_on_tiles(
@@ -164,14 +182,10 @@ def nest_on_strip(shapes: Sequence[Polygon], *, width: float, gap: float) -> flo
         places.clear()
         length = 0
         for k in order:
-            # The first free place (row, column) of each mask.
-            found = []
-            for mask in masks[k]:
-                free = places.free(mask)
-                row = int(np.argmax(free.any(axis=1)))
-                if not free[row].any():
-                    return None
-                found.append((row, int(np.argmax(free[row])), mask))
+            free = [places.free(mask) for mask in masks[k]]
+            if not all(each.any() for each in free):
+                return None
+            found = [(*first_free(each), mask) for each, mask in zip(free, masks[k], strict=True)]
             row, column, mask = min(found, key=lambda item: (max(length, item[0] + len(item[2].cells)), item[0]))
             places.take(mask, row, column)
             length = max(length, row + len(mask.cells))
@@ -186,9 +200,14 @@ def nest_on_strip(shapes: Sequence[Polygon], *, width: float, gap: float) -> flo
     return min(lengths) * float(cell[1])
 
 
+def first_free(free: BoolArray) -> tuple[int, int]:
+    """Return the row and the column of the first free place, of which there is one: the lowest row, and there the lowest column."""
+    row, column = divmod(int(np.argmax(free)), free.shape[1])
+    return row, column
+
+
 def _masks(shape: Polygon, cell: FloatArray, gap: float, turns: Sequence[int]) -> list[Mask]:
     """Return a shape as cells in its positions, grown by half of the gap; a cell that it touches is its own."""
-    import shapely
     from shapely.affinity import rotate
 
     found = []
@@ -197,14 +216,13 @@ def _masks(shape: Polygon, cell: FloatArray, gap: float, turns: Sequence[int]) -
         grown = turned.simplify(CELL / 20).buffer(gap / 2 + CELL / 20)
         low, high = np.array(grown.bounds[:2]), np.array(grown.bounds[2:])
         columns, rows = np.maximum(1, np.ceil((high - low) / cell - 1e-9)).astype(int)
-        shapely.prepare(grown)
         extent = np.array(turned.bounds[2:]) - np.array(turned.bounds[:2])
-        cells = _touched_cells(grown, np.array([low[0], high[1]]), cell, (int(rows), int(columns)))
+        cells = touched_cells(grown, np.array([low[0], high[1]]), cell, (int(rows), int(columns)))
         found.append(Mask(cells=cells, quarters=quarters, extent=extent))
     return found
 
 
-def _touched_cells(area: Polygon, corner: FloatArray, cell: FloatArray, shape: tuple[int, int]) -> BoolArray:
+def touched_cells(area: Polygon, corner: FloatArray, cell: FloatArray, shape: tuple[int, int]) -> BoolArray:
     """Return which cells a polygon touches, by row and column from the upper left corner on."""
     import shapely
 
@@ -213,6 +231,7 @@ def _touched_cells(area: Polygon, corner: FloatArray, cell: FloatArray, shape: t
         return shapely.box(left, top - size * cell[1], left + size * cell[0], top)
 
     # Most blocks of cells lie within the polygon or beside it.
+    shapely.prepare(area)
     row, column = np.indices([-(-side // _BLOCK) for side in shape])
     blocks = boxes(row, column, _BLOCK)
     touched = shapely.intersects(area, blocks)
@@ -276,7 +295,7 @@ def _lay(
             return None
         places[k] = best[1:]
         sheet.take(*best[1:])
-        used |= _touched(best[1].cells, best[2], best[3], grid)
+        used |= grid.tiles_under(*best[1:])
         total = float(used.sum()) + SPREAD * (int(used.any(axis=1).sum()) + int(used.any(axis=0).sum()))
         if total >= below:
             return None
@@ -304,23 +323,6 @@ def _covered(cells: BoolArray, rows: tuple[IntArray, IntArray], columns: tuple[I
 
     (top, bottom), (left, right) = rows, columns
     return np.asarray(at(bottom, right) - at(top, right) - at(bottom, left) + at(top, left) > 0)
-
-
-def _touched(cells: BoolArray, row: int, column: int, grid: _Grid) -> BoolArray:
-    """Return the tiles that a mask takes at one place."""
-    starts = row % grid.per_tile[0], column % grid.per_tile[1]
-    rows, columns = (
-        (blocks[0][start : start + 1], blocks[1][start : start + 1])
-        for blocks, start in (
-            (_blocks(cells.shape[axis], grid.per_tile[axis], grid.shared[axis]), starts[axis]) for axis in (0, 1)
-        )
-    )
-    covered = _covered(cells, rows, columns)[0, :, 0, :]
-    tiles = np.zeros(grid.tiles, dtype=bool)
-    i, j = row // grid.per_tile[0], column // grid.per_tile[1]
-    part = tiles[i : i + covered.shape[0], j : j + covered.shape[1]]
-    part |= covered[: part.shape[0], : part.shape[1]]
-    return tiles
 
 
 class Places:

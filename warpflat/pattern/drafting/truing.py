@@ -12,6 +12,7 @@ from warpflat.pattern.drafting.curves import Curve, cubic_weights, split_bezier
 from warpflat.pattern.drafting.fitting import EdgeKey
 from warpflat.pattern.drafting.piece_parts import Edge
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
+from warpflat.pattern.drafting.polygons import turn_between
 
 __all__ = ["CornerReport", "true_corners", "turned_end"]
 
@@ -63,8 +64,7 @@ class _Corner:
         """Return the sum of the angles [rad] inside the pieces, between an edge and the next one, counter-clockwise."""
         total = 0.0
         for arrive, leave in self.ends:
-            (x, y), (u, v) = -end_direction(curves[arrive[0]].reversed()), end_direction(curves[leave[0]])
-            total += float(np.pi - np.arctan2(x * v - y * u, x * u + y * v))
+            total += np.pi - turn_between(-end_direction(curves[arrive[0]].reversed()), end_direction(curves[leave[0]]))
         return total
 
 
@@ -164,16 +164,11 @@ def _least_turns(corners: Sequence[_Corner], shares: FloatArray, curves: Mapping
 def _seam_corners(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[_Corner]:
     """Yield the corners at both ends of every seam, and at the mouth of every dart."""
     by_name = {piece.name: piece for piece in pieces}
-    for seam in seams:
+    # At the tip of a dart no edges run on.
+    for seam in (*seams, *(dart for piece in pieces for dart in piece.dart_seams)):
         for last in (False, True):
             sides = [row[-1 if last else 0] for row in seam.sides]
             corner = _corner_between(by_name, seam.name, [(side, last != side.reversed) for side in sides])
-            if corner is not None:
-                yield corner
-    for piece in pieces:
-        for dart in piece.darts:
-            left, right = (SeamSide(piece=piece.name, edge=name) for name in (dart.left, dart.right))
-            corner = _corner_between(by_name, dart.name, [(left, False), (right, True)])
             if corner is not None:
                 yield corner
 
