@@ -17,7 +17,6 @@ from warpflat.core import InputError, IntArray, guarded, nearest
 from warpflat.flat import (
     SIDES,
     RawMesh,
-    SewnPanel,
     Surface,
     line_between,
     line_from_curve,
@@ -25,10 +24,10 @@ from warpflat.flat import (
     line_on_border,
     line_on_plane,
     read_mesh_file,
-    read_sewn_panels,
     surface_of_file,
     with_lines,
 )
+from warpflat.garment import SewnPanel, read_sewn_panels
 
 __all__ = ["scene_pieces", "scene_sewn_panels", "scene_surface", "with_piece_tables"]
 
@@ -40,13 +39,14 @@ def scene_surface(scene: Scene, read: tuple[Path, RawMesh, float, list[Path]] | 
         InputError: the file or shape is wrong, an environment variable is not set, or a line is not on the surface.
     """
     from warpflat.app.scene.seams import scene_surface_seams
-    from warpflat.flat import surface_seams
+    from warpflat.garment import surface_seams
 
     table = scene.settings.surface
     if table is None:
         raise InputError(f"{scene.where}: the scene has no [surface]; this needs one piece, not a garment")
     if isinstance(table, ShapeSurface):
-        from warpflat.flat import PIECES, make_shape
+        from warpflat.app.scene.first_shapes import PIECES
+        from warpflat.flat import make_shape
 
         with errors_named(f"{scene.where}: surface"):
             if table.shape in PIECES:
@@ -119,7 +119,8 @@ def scene_pieces(scene: Scene) -> tuple[Surface, ...] | None:
     Raises:
         InputError: the file or a parameter of the shape is wrong, or an environment variable is not set.
     """
-    from warpflat.flat import MEET, PIECES, make_pieces, read_pieces
+    from warpflat.app.scene.first_shapes import PIECES, make_pieces
+    from warpflat.flat import MEET, read_pieces
 
     table = scene.settings.surface
     if isinstance(table, ShapeSurface) and table.shape in PIECES:

@@ -14,6 +14,7 @@ __all__ = [
     "DRAFTED_CLOTH",
     "ENERGY",
     "LEAST_GAP",
+    "LEAST_PRESSURE",
     "SHARE",
     "SKIN",
     "SMALLEST_SCALE",
@@ -28,8 +29,8 @@ __all__ = [
 ENERGY = "energy"
 #: Colours of bodies, and of cloth that was drafted and bears no map, sRGB.
 SKIN, DRAFTED_CLOTH = (0.88, 0.86, 0.82), (0.62, 0.64, 0.68)
-#: The least upper end of a scale of gaps between cloth and body [mm].
-LEAST_GAP = 5.0
+#: The least upper ends of scales of gaps between cloth and body [mm], and of pressure on the skin [Pa].
+LEAST_GAP, LEAST_PRESSURE = 5.0, 10.0
 #: Of the cloth, by area, within a scale: a few sliver faces would otherwise make the rest of a map pale.
 SHARE = 0.98
 

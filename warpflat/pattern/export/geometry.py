@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from warpflat.core import FloatArray, IntArray
-from warpflat.flat import area_vectors, half_edges, triangulate
+from warpflat.flat import flat_areas, half_edges, triangulate
 
 __all__ = [
     "Polylines",
@@ -34,7 +34,7 @@ def polylines_of(lines: Mapping[str, Any] | None) -> dict[str, Polylines]:
 def face_areas(positions: FloatArray, faces: IntArray) -> FloatArray:
     """Return the area [m2] of each face (#F by 4) over positions (#V by 2 or 3); quads are split along corners 0-2."""
     triangles, face = triangulate(faces)
-    areas = np.linalg.norm(area_vectors(positions, triangles), axis=1)
+    areas = flat_areas(positions, triangles)
     return np.bincount(face, weights=areas, minlength=len(faces)).astype(np.float64)
 
 
