@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, FloatArray, IntArray
+from warpflat.core import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from shapely import Polygon
@@ -98,7 +98,7 @@ class _Grid:
             (top, bottom), (left, right) = ends
             sums = np.pad(np.cumsum(np.cumsum(mask.cells, axis=0), axis=1), ((1, 0), (1, 0)))
 
-            def at(row: IntArray, column: IntArray) -> IntArray:
+            def at(row: NDArray[Any], column: NDArray[Any]) -> NDArray[Any]:
                 return np.asarray(sums[row[:, :, None, None], column])
 
             cells = at(bottom, right) - at(top, right) - at(bottom, left) + at(top, left)

@@ -163,6 +163,7 @@ def _least_turns(corners: Sequence[_Corner], shares: FloatArray, curves: Mapping
 def _corners(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[_Corner]:
     """Yield the corners at both ends of every seam and every fold, and at the mouth of every dart."""
     by_name = {piece.name: piece for piece in pieces}
+    lines: list[tuple[str, Sequence[Sequence[SeamSide]]]]
     lines = [(seam.name, seam.sides) for seam in (*seams, *(dart for piece in pieces for dart in piece.dart_seams))]
     lines += [
         (f"{piece.name}.{edge.name}", ((SeamSide(piece=piece.name, edge=edge.name),),))
