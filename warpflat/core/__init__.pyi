@@ -12,7 +12,6 @@ from .beside import work_beside as work_beside
 from .compile import compile_all_modules as compile_all_modules
 from .compile import launch_quietly as launch_quietly
 from .compile import start_warp as start_warp
-from .environment import require_environment as require_environment
 from .errors import SIGNALS as SIGNALS
 from .errors import CannotWriteError as CannotWriteError
 from .errors import InputError as InputError
@@ -106,10 +105,7 @@ from .text import without_side as without_side
 from .threads import thread_count as thread_count
 from .toml_file import Table as Table
 from .toml_file import check_table as check_table
-from .toml_file import document_as_toml as document_as_toml
-from .toml_file import laid_over as laid_over
 from .toml_file import read_toml as read_toml
-from .toml_file import tables_as_toml as tables_as_toml
 from .usd_layers import check_layers as check_layers
 from .usd_process import UNREADABLE as UNREADABLE
 from .usd_process import read_apart as read_apart

@@ -59,11 +59,11 @@ def plain_label(label: str) -> str:
     return "".join("_" if control_in(letter) else letter for letter in label)
 
 
-def make_file_name(name: str, otherwise: str = "piece") -> str:
+def make_file_name(name: str) -> str:
     """Return a name that was not chosen for a file, such as that of a node in a scene, changed so that a file can have it."""
     plain = "".join("_" if _is_forbidden(letter) else letter for letter in name).strip().lstrip(".")
     short = plain.encode()[:_MOST_BYTES].decode(errors="ignore")
-    return f"_{short}" if _is_device(short) else short or otherwise
+    return f"_{short}" if _is_device(short) else short or "piece"
 
 
 def make_piece_name(name: str) -> str:

@@ -133,3 +133,8 @@ from .export.views import make_facets as make_facets
 from .export.views import pattern_view as pattern_view
 from .export.views import view_from_side as view_from_side
 from .export.walked_picture import write_walked_picture as write_walked_picture
+from .export.wear_words import RANGES as RANGES
+from .export.wear_words import STRAINS as STRAINS
+from .export.wear_words import limit_words as limit_words
+from .export.wear_words import pressure_words as pressure_words
+from .export.wear_words import strain_words as strain_words

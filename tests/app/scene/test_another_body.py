@@ -16,8 +16,8 @@ from command import Command
 from warpflat.app.scene.fit import STUDY_FILES, FitJob, Fitted, ease_wishes, fit_to, study_table
 from warpflat.core.errors import InputError
 from warpflat.core.output import refuse_to_replace_others
-from warpflat.flat.surface.io.file_seams import file_seams
-from warpflat.flat.surface.io.sewn_panels import read_sewn_panels
+from warpflat.garment.construction.file_seams import file_seams
+from warpflat.garment.construction.sewn_panels import read_sewn_panels
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation
 from warpflat.garment.mannequin.fit_body import Mesh
 from warpflat.garment.seams.layers import read_garment

@@ -16,8 +16,8 @@ from warpflat.app.scene.load import make_scene
 from warpflat.app.scene.plan import plan_scene
 from warpflat.flat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.normals import flat_areas
 from warpflat.flat.surface.repair.meet import meet_borders
-from warpflat.flat.surface.repair.sheets import face_vectors
 from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.garment.construction.sew_pieces import meeting_borders, unsewn_borders
 
@@ -36,7 +36,7 @@ def moved(surface: Surface, by: object) -> Surface:
 
 
 def area(surface: Surface) -> float:
-    return float(np.linalg.norm(face_vectors(surface.vertices, surface.faces), axis=1).sum())
+    return float(flat_areas(surface.vertices, surface.faces).sum())
 
 
 def sewn(surfaces: list[Surface]) -> list[tuple[int, int]]:

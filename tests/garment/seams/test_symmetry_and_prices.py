@@ -14,7 +14,7 @@ import warpflat
 from warpflat.app.cli.main import main
 from warpflat.app.scene.found_seams import found_seams
 from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.mirror import mirror_images
+from warpflat.garment.construction.mirror import mirror_images
 from warpflat.garment.seams.anatomy import find_anatomy
 from warpflat.garment.seams.fields import Operators
 from warpflat.garment.seams.find import FoundSeams, cloth_of

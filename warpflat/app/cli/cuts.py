@@ -91,9 +91,10 @@ def cuts(
         raise InputError("--at belongs to --rotate and --split")
     from warpflat.app.cli.progress_bar import ProgressBar
     from warpflat.app.cli.tables import ledger_table
+    from warpflat.app.scene.as_toml import tables_as_toml
     from warpflat.app.scene.ledger import cuts_of_entry, scene_ledger, with_cut
     from warpflat.app.scene.run import files_of_run, run_scene
-    from warpflat.core import expect_files, optional_file, output_folder, tables_as_toml, write_report
+    from warpflat.core import expect_files, optional_file, output_folder, write_report
     from warpflat.pattern import write_ledger_picture
 
     expected = ["ledger.json", "ledger.png", *(files_of_run(loaded) if apply is not None else [])]

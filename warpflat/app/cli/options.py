@@ -10,8 +10,9 @@ from typing import Any
 
 import click
 
+from warpflat.app.cli.environment import require_environment
 from warpflat.app.scene.options import SCENE_OPTIONS
-from warpflat.core import require_environment, require_memory_for_libraries
+from warpflat.core import require_memory_for_libraries
 
 __all__ = [
     "BAD_INPUT",

@@ -91,10 +91,10 @@ def start_warp_silently() -> None:
 
 def report_run(result: SceneResult, folder: Path, output: Output) -> int:
     """Print the result of a run, and return the exit code."""
+    from warpflat.app.cli.fit_lines import fit_lines
     from warpflat.app.cli.summary import notes_line, summary_lines
     from warpflat.app.cli.tables import drape_lines, run_summary
     from warpflat.app.review.faults import faults_of
-    from warpflat.flat import fit_lines
 
     warnings = faults_of(result.metrics)
     if output.tells:

@@ -13,8 +13,9 @@ from warpflat.app.scene.form_shaping import settle_shape
 from warpflat.app.scene.load import Scene, scene_fabric
 from warpflat.app.scene.plan import plan_scene
 from warpflat.core import InputError, aligned, laid_upon
-from warpflat.flat import STRAINS, Progress, advise, judge
+from warpflat.flat import Progress, advise, judge
 from warpflat.garment import Garment
+from warpflat.pattern import STRAINS
 
 __all__ = ["compare_fabrics", "compared_files", "comparison_table", "save_comparison"]
 

@@ -31,8 +31,8 @@ from warpflat.garment import EASE_LEVELS
 
 if TYPE_CHECKING:
     from warpflat.app.scene.run import SceneResult
-    from warpflat.flat import RawMesh, SewnPanel
-    from warpflat.garment import CommonBody, GarmentFile
+    from warpflat.flat import RawMesh
+    from warpflat.garment import CommonBody, GarmentFile, SewnPanel
 
 __all__ = [
     "STUDY_FILES",
@@ -355,7 +355,7 @@ def _known_pattern(read: GarmentFile, name: str) -> list[SewnPanel]:
     A texture in millimetres or centimetres has been measured. One that fits in another unit may be a normalised one by chance: it must lay
     the cloth nearly as it is worn.
     """
-    from warpflat.flat import sewn_panels, stretches_worn
+    from warpflat.garment import sewn_panels, stretches_worn
 
     try:
         panels = sewn_panels(read.raw, read.scale, name=make_piece_name(name))
@@ -427,8 +427,7 @@ def fit_to(
     """
     from warpflat.app.scene.run import files_of_run, run_scene
     from warpflat.core import output_folder, record_file
-    from warpflat.flat import graded_layout, with_cuts
-    from warpflat.garment import finer_body
+    from warpflat.garment import finer_body, graded_layout, with_cuts
 
     known, raw = job.panels if job.keeps_pattern(tables) else [], job.read.raw
     if known:

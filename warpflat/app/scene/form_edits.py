@@ -9,12 +9,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from warpflat.app.scene.as_toml import tables_as_toml
 from warpflat.app.scene.cuts import asked_cuts, cut_of_dart, cuts_beside, omitted, place_of, scene_with
 from warpflat.app.scene.form import scene_form, scene_recipe
 from warpflat.app.scene.form_shaping import settle_shape
 from warpflat.app.scene.load import Scene
 from warpflat.app.scene.plan import plan_garment
-from warpflat.core import InputError, nearest, polyline_length, tables_as_toml
+from warpflat.core import InputError, nearest, polyline_length
 from warpflat.garment import FormDart, FormGarment, plan_form
 
 __all__ = ["KINDS", "DartEdit", "edit_dart", "rotate_dart", "split_dart", "turn_dart"]

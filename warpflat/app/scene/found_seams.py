@@ -32,8 +32,8 @@ from warpflat.flat import half_edges, weld_map
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from warpflat.flat import Fabric, FileSeams, Flattening, Surface
-    from warpflat.garment import FoundSeams, GarmentFile, SeamCut
+    from warpflat.flat import Fabric, Flattening, Surface
+    from warpflat.garment import FileSeams, FoundSeams, GarmentFile, SeamCut
     from warpflat.pattern import FoundSeam
 
 __all__ = ["NO_PATTERN", "found_seams", "plain_panel", "read_edges", "seams_entry", "waist_of_body"]
@@ -56,8 +56,8 @@ def found_seams(scene: Scene) -> FoundSeams | None:
     Raises:
         InputError: the file is wrong.
     """
-    from warpflat.flat import FILE_SEAMS, file_seams, like_cut_pieces, object_parts
-    from warpflat.garment import SeamOptions, find_seams, read_garment
+    from warpflat.flat import object_parts
+    from warpflat.garment import FILE_SEAMS, SeamOptions, file_seams, find_seams, like_cut_pieces, read_garment
 
     settings, table = scene.settings, scene.settings.surface
     drawn, asked = settings.seams_cut, settings.find_seams or FindSeamsTable()
@@ -179,7 +179,7 @@ def _asked_of_file(path: Path, find: str, seams: Mapping[str, FileSeams]) -> Fil
     Raises:
         InputError: the file has none of them, or too many for a pattern.
     """
-    from warpflat.flat import FILE_SEAMS, MOST_ISLANDS
+    from warpflat.garment import FILE_SEAMS, MOST_ISLANDS
 
     wanted = FILE_SEAMS if find == "file" else (find,)
     taken = next((seams[way] for way in wanted if way in seams), None)
@@ -397,7 +397,8 @@ def plain_panel(scene: Scene) -> Surface | None:
 
     A file whose texture has several islands may bring its seams.
     """
-    from warpflat.flat import file_seams, read_mesh_file
+    from warpflat.flat import read_mesh_file
+    from warpflat.garment import file_seams
 
     settings, table = scene.settings, scene.settings.surface
     if not isinstance(table, FileSurface) or table.component is not None or settings.find_seams or settings.seams_cut:

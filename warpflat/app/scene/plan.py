@@ -19,11 +19,9 @@ from warpflat.app.scene.seams import scene_constraints, scene_surface_seams, sce
 from warpflat.app.scene.surface import scene_pieces, scene_sewn_panels, scene_surface, with_piece_tables
 from warpflat.core import InputError, StepError, optional_step, report_activity
 from warpflat.flat import (
-    BorderSeam,
     Flattening,
     Progress,
     RelaxOptions,
-    SewnPanel,
     Surface,
     advise,
     as_fabric,
@@ -36,6 +34,7 @@ from warpflat.flat import (
 from warpflat.garment import (
     CURVES_MM,
     GRAIN,
+    BorderSeam,
     Constraint,
     FormGarment,
     FormResult,
@@ -45,6 +44,7 @@ from warpflat.garment import (
     Opening,
     PatternOptions,
     SeamWish,
+    SewnPanel,
     cap_wishes,
     check_edge_names,
     check_fold_grain,
@@ -499,7 +499,7 @@ def flatten_surface(
     """
     settings, start = scene.settings, None
     if settings.start is not None:
-        from warpflat.flat import read_layout
+        from warpflat.app.scene.read_layout import read_layout
 
         with errors_named(f"{scene.where}: start"):
             start = read_layout(scene.folder / expand_variables(settings.start))

@@ -17,8 +17,9 @@ from pydantic import (
     model_validator,
 )
 
+from warpflat.app.scene.first_shapes import PIECES
 from warpflat.core import Table, is_number, plain_name, quote_value
-from warpflat.flat import DEFAULT_FABRIC, FORMER_SOLVERS, PIECES, FabricTable, RelaxOptions, Solver
+from warpflat.flat import DEFAULT_FABRIC, FORMER_SOLVERS, FabricTable, RelaxOptions, Solver
 from warpflat.garment import MannequinTable
 
 if TYPE_CHECKING:

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from warpflat.app.scene.as_toml import document_as_toml
 from warpflat.app.scene.load import Scene, load_scene
 from warpflat.app.scene.run import run_scene
-from warpflat.core import InputError, atomic_path, check_file_name, document_as_toml, make_file_name, plain_name
+from warpflat.core import InputError, atomic_path, check_file_name, make_file_name, plain_name
 from warpflat.flat import Progress
 
 __all__ = ["Saved", "free_name", "run_saved", "scene_file", "write_scene"]

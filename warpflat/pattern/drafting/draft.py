@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
-from itertools import chain
 
 import numpy as np
 
@@ -24,13 +23,7 @@ from warpflat.pattern.drafting.drafted import (
     Notch,
     SeamReport,
 )
-from warpflat.pattern.drafting.drafted_darts import (
-    dart_legs,
-    dart_line,
-    dart_notes,
-    fisheye_legs,
-    smooth_fisheye,
-)
+from warpflat.pattern.drafting.drafted_darts import dart_notes, draft_dart, fisheye_legs, fold_darts, smooth_fisheye
 from warpflat.pattern.drafting.fitting import (
     ALIKE,
     TOLERANCES,
@@ -147,12 +140,11 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
     import shapely
 
     frame = _frame(piece)
-    darts = dart_legs(piece, edges)
-    drafted_legs = {leg.name: leg for legs in darts.values() for leg in (legs.left, legs.right)}
-    edges = tuple(drafted_legs.get(edge.name, edge) for edge in edges)
+    edges, wedges = fold_darts(piece, edges)
+    by_name = {edge.name: edge for edge in edges}
     # The outline in order; a wedge stands for both legs of a folded dart.
-    folded = {legs.dart.left: legs.wedge for legs in darts.values() if legs.wedge is not None}
-    right_legs = {legs.dart.right for legs in darts.values() if legs.wedge is not None}
+    folded = {dart.left: wedges[dart.name] for dart in piece.darts if dart.name in wedges}
+    right_legs = {dart.right for dart in piece.darts if dart.name in wedges}
     sides: list[Side | Wedge] = []
     for edge in edges:
         if edge.name in folded:
@@ -160,7 +152,11 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         elif edge.name not in right_legs:
             sides.append(Side(name=edge.name, points=edge.line, width=edge.width, kind=edge.kind))
     cut = cut_outline(sides)
-    drafted_darts = tuple(dart_line(legs, cut.points) for legs in darts.values())
+    legs = [(by_name[dart.left], by_name[dart.right]) for dart in piece.darts]
+    darts = tuple(
+        draft_dart(dart, left.line, right.line, wedges.get(dart.name), cut.points)
+        for dart, (left, right) in zip(piece.darts, legs, strict=True)
+    )
     holes = {hole.name: mapped(hole.points, frame) for hole in piece.holes}
     fisheyes = {hole.name: smooth_fisheye(holes[hole.name], tolerance) for hole in piece.holes if hole.kind == "dart"}
     cutouts = {}
@@ -180,7 +176,7 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         grain = default_grain(sew_line, list(holes.values()))
     grain = _beside_lines(grain, list(internal.values()), sew_line)
     # Pleats are not marked through the cloth.
-    drilled = [DrillHole(name=dart.dart.name, at=dart.tip) for dart in drafted_darts if dart.dart.pleat is None]
+    drilled = [DrillHole(name=dart.dart.name, at=dart.tip) for dart in darts if dart.dart.pleat is None]
     drilled += [
         DrillHole(name=name, at=end) for name, line in fisheyes.items() for end in fisheye_legs(line)[0][[0, -1]]
     ]
@@ -200,12 +196,12 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         frame=frame,
         edges=edges,
         cut_line=cut.points,
-        darts=drafted_darts,
+        darts=darts,
         drill_holes=(
             *drilled,
             *(DrillHole(name=name, at=mapped(at[None], frame)[0]) for name, at in piece.marks.items()),
         ),
-        notches=dart_notches(piece, {name: legs.wedge for name, legs in darts.items() if legs.wedge is not None}, cut),
+        notches=dart_notches(piece, wedges, cut),
         internal_lines=internal,
         cutouts=cutouts,
         fisheyes=fisheyes,
@@ -214,7 +210,7 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         notes=(
             *cut.notes,
             *(ragged if wavy else ()),
-            *chain.from_iterable(map(dart_notes, darts.values())),
+            *(note for dart, both in zip(darts, legs, strict=True) for note in dart_notes(dart, *both)),
             *[
                 f"{hole.name} is too small for an allowance of {hole.width * 1000:g} mm: it is cut on its sewing line"
                 for hole in piece.holes

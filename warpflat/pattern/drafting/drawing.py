@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core import FloatArray, name_without_number, polyline_length, resample, without_side
+from warpflat.core import FloatArray, name_without_number, polyline_length, resample, unit, without_side
 from warpflat.pattern.drafting.curves import Curve, fit_curve
 from warpflat.pattern.drafting.draft import nest_label
 from warpflat.pattern.drafting.drafted import DraftedEdge, DraftedPiece
@@ -147,7 +147,7 @@ def _widest_edge(pieces: Sequence[DraftedPiece]) -> str:
     def shift_across(name: str) -> float:
         first, last = (resample(piece.edge(name).line, 0.5) for piece in (pieces[0], pieces[-1]))
         start, end = pieces[0].edge(name).line[[0, -1]]
-        x, y = (end - start) / max(float(np.linalg.norm(end - start)), 1e-12)
+        x, y = unit(end - start)
         return abs(float((last - first) @ [y, -x]))
 
     names = [e.name for e in pieces[0].edges if e.kind not in ("fold", "dart")]
@@ -199,7 +199,7 @@ def _cut_strokes(piece: DraftedPiece, *, open_folds: bool) -> list[Stroke]:
     on_fold = np.zeros(len(ring), dtype=bool)
     for edge in piece.fold_edges:
         start, end = edge.line[[0, -1]]
-        along = (end - start) / np.linalg.norm(end - start)
+        along = unit(end - start)
         away = [np.abs((points - start) @ [-along[1], along[0]]) for points in (ring, onwards)]
         on_fold |= np.maximum(*away) < ON_FOLD
     if not on_fold.any() or on_fold.all():
@@ -453,7 +453,7 @@ def grain_strokes(grain: FloatArray) -> list[Stroke]:
 
 
 def _arrow(tip: FloatArray, direction: FloatArray) -> Stroke:
-    along = direction / max(float(np.linalg.norm(direction)), 1e-12)
+    along = unit(direction)
     across = np.array([-along[1], along[0]])
     points = np.stack([tip - ARROW * along + BARB * across, tip, tip - ARROW * along - BARB * across])
     return Stroke(role="grain", name="", points=points)

@@ -156,7 +156,7 @@ def bend_one_way(
 
     places, even = _evenly(points)
     chord = even[-1] - even[0]
-    along = chord / max(float(np.linalg.norm(chord)), 1e-12)
+    along = unit(chord)
     across = np.array([-along[1], along[0]])
     x, y = (even - even[0]) @ along, (even - even[0]) @ across
     if np.diff(x).min() <= 0.0:

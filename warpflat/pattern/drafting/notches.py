@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 
-from warpflat.core import FloatArray, arc_lengths, points_at_lengths
+from warpflat.core import FloatArray, arc_lengths, points_at_lengths, unit
 from warpflat.pattern.drafting.allowance import CutOutline
 from warpflat.pattern.drafting.drafted import DraftedPiece, Notch, SeamReport
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
@@ -337,6 +337,6 @@ class SeamLine:
         length = float(np.clip(length, 0.0, self.edges[index].length))
         # The direction is taken over a few millimetres: single short chords jitter.
         near, at, far = points_at_lengths(self.lines[index], [length - 2e-3, length, length + 2e-3])
-        tangent = (far - near) / max(float(np.linalg.norm(far - near)), 1e-12)
+        tangent = unit(far - near)
         inwards = np.array([-tangent[1], tangent[0]])
         return at, -inwards if self.side[index].reversed else inwards

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core import FARTHEST, FloatArray, InputError
+from warpflat.core import FARTHEST, FloatArray, InputError, unit
 from warpflat.pattern.drafting.corners import find_corners
 from warpflat.pattern.drafting.curves import CHORD
 from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT, MOST_ALLOWANCE, Dart, Edge
@@ -113,7 +113,7 @@ def _along_fold(ring: FloatArray, fold: FloatArray) -> tuple[int, int] | None:
 
     None where the closed line runs nowhere along it, or lies on both sides of it: then it is whole.
     """
-    direction = (fold[1] - fold[0]) / np.linalg.norm(fold[1] - fold[0])
+    direction = unit(fold[1] - fold[0])
     away, along = (ring - fold[0]) @ np.array([direction[1], -direction[0]]), ring @ direction
     if min(away.max(), -away.min()) > FOLD_STRAIGHT:
         return None

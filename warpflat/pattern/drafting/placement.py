@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, points_at_lengths, polyline_length
+from warpflat.core import FloatArray, points_at_lengths, polyline_length, unit
 from warpflat.pattern.drafting.drafted import DraftedPiece
 from warpflat.pattern.drafting.label import LEADING, TEXT, TITLE, Label, box_around, label_lines, text_width, wrap_text
 from warpflat.pattern.drafting.polygons import rotation
@@ -253,7 +253,7 @@ def spots_along(
         centre = min(max(share * total, 0.52 * width), total - 0.52 * width)
         stretch = points_at_lengths(line, centre + np.linspace(-0.5, 0.5, 9) * width)
         before, after = stretch[[0, -1]]
-        along = (after - before) / max(float(np.linalg.norm(after - before)), 1e-12)
+        along = unit(after - before)
         backwards = along[0] < -_STEEP or (abs(along[0]) <= _STEEP and along[1] < 0)
         along = -along if backwards else along
         above = np.array([-along[1], along[0]])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, reflected
+from warpflat.core import FloatArray, reflected, unit
 
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon
@@ -161,7 +161,7 @@ def rotation(angle: float) -> FloatArray:
 
 def upright(direction: FloatArray) -> FloatArray:
     """Return the 2 by 2 matrix that turns a direction upwards."""
-    x, y = direction / np.linalg.norm(direction)
+    x, y = unit(direction)
     return np.array([[y, -x], [x, y]])
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, FloatArray, IntArray
+from warpflat.core import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from shapely import Polygon
@@ -88,10 +88,21 @@ class _Grid:
     def touched(self, mask: Mask) -> FloatArray:
         """Return which tiles a mask touches (1, else 0), by the cell of a tile where it starts and the tile: down and across."""
         if id(mask) not in self._touched:
-            rows, columns = (
-                _blocks(mask.cells.shape[axis], self.per_tile[axis], self.shared[axis]) for axis in range(2)
-            )
-            self._touched[id(mask)] = _covered(mask.cells, rows, columns).astype(np.float32)
+            # By the cell of a tile where the mask starts, which of its rows or columns lie in the tiles from there on. The strip that a
+            # tile shares with the one before is printed there, and does not count.
+            ends = []
+            for size, per_tile, shared in zip(mask.cells.shape, self.per_tile, self.shared, strict=True):
+                start, tile = np.arange(per_tile)[:, None], np.arange((size + per_tile - 2) // per_tile + 1)
+                low = np.clip(tile * per_tile + shared - start, 0, size)
+                ends.append((low, np.maximum(low, np.clip((tile + 1) * per_tile - start, 0, size))))
+            (top, bottom), (left, right) = ends
+            sums = np.pad(np.cumsum(np.cumsum(mask.cells, axis=0), axis=1), ((1, 0), (1, 0)))
+
+            def at(row: NDArray[Any], column: NDArray[Any]) -> NDArray[Any]:
+                return np.asarray(sums[row[:, :, None, None], column])
+
+            cells = at(bottom, right) - at(top, right) - at(bottom, left) + at(top, left)
+            self._touched[id(mask)] = (cells > 0).astype(np.float32)
         return self._touched[id(mask)]
 
     def tiles_under(self, mask: Mask, row: int, column: int) -> BoolArray:
@@ -300,29 +311,6 @@ def _lay(
         if total >= below:
             return None
     return total, [places[k] for k in range(len(masks))]
-
-
-def _blocks(size: int, per_tile: int, shared: int) -> tuple[IntArray, IntArray]:
-    """Return for a mask that starts at each cell of a tile which of its rows lie in the tiles from there on.
-
-    The strip that a tile shares with the one before is printed there, and does not count.
-    """
-    start = np.arange(per_tile)[:, None]
-    tile = np.arange((size + per_tile - 2) // per_tile + 1)[None, :]
-    low = np.clip(tile * per_tile + shared - start, 0, size)
-    high = np.clip((tile + 1) * per_tile - start, 0, size)
-    return low, np.maximum(low, high)
-
-
-def _covered(cells: BoolArray, rows: tuple[IntArray, IntArray], columns: tuple[IntArray, IntArray]) -> BoolArray:
-    """Return whether blocks of a mask hold any cell: by start and tile down, start and tile across."""
-    sums = np.pad(np.cumsum(np.cumsum(cells, axis=0), axis=1), ((1, 0), (1, 0)))
-
-    def at(r: IntArray, c: IntArray) -> IntArray:
-        return np.asarray(sums[r[:, :, None, None], c[None, None, :, :]])
-
-    (top, bottom), (left, right) = rows, columns
-    return np.asarray(at(bottom, right) - at(top, right) - at(bottom, left) + at(top, left) > 0)
 
 
 class Places:

@@ -59,10 +59,8 @@ _CLOTH, _NO_VALUE = (0.955, 0.94, 0.90), "#c8c8c8"
 
 def energy_colours(density: ArrayLike, scale: float) -> FloatArray:
     """Return sRGB colours (#N by 3, 0 to 1) of energy densities [J/m2] (#N), the last colour above `scale`."""
-    position = np.clip(np.asarray(density, dtype=np.float64) / scale, 0.0, 1.0) * (len(_ANCHORS) - 1)
-    lower = np.minimum(position.astype(np.int64), len(_ANCHORS) - 2)
-    fraction = (position - lower)[..., None]
-    return np.asarray(_ANCHORS[lower] * (1.0 - fraction) + _ANCHORS[lower + 1] * fraction)
+    shares, places = np.asarray(density, dtype=np.float64) / scale, np.linspace(0.0, 1.0, len(_ANCHORS))
+    return np.stack([np.interp(shares, places, channel) for channel in _ANCHORS.T], axis=-1)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -244,7 +244,8 @@ def find_outlines(
     if page is not None and len(rings) > 1:
         frames = [k for k, ring in enumerate(rings) if _is_frame(ring.points, page)]
         frames = frames if len(frames) < len(rings) else []
-        notes += [f"{_called(rings[k])} has the page's size and was taken for its frame" for k in frames]
+        names = [quote_value(rings[k].name) if rings[k].name else "a closed line" for k in frames]
+        notes += [f"{name} has the page's size and was taken for its frame" for name in names]
     rings = [ring for k, ring in enumerate(rings) if k not in frames]
     whole = [simple_ring(ring.points, f"{where}: {ring.name}" if ring.name else where) for ring in rings]
     polygons = np.array([shapely.Polygon(ring) for ring in whole])
@@ -303,10 +304,6 @@ def check_closed(chains: Sequence[FloatArray], pieces: Sequence[Any], where: str
             raise InputError(
                 f"{where}: an outline is open by {1e3 * gap:.1f} mm at ({at}) mm; join its ends, for a piece is a closed line"
             )
-
-
-def _called(ring: DrawnLine) -> str:
-    return quote_value(ring.name) if ring.name else "a closed line"
 
 
 def _largest_first(rings: Sequence[DrawnLine]) -> list[DrawnLine]:

@@ -11,10 +11,10 @@ from obj_files import write_obj
 
 import warpflat
 from warpflat.core.polyline import polyline_length
-from warpflat.flat.flattening.straight_band import find_band
 from warpflat.flat.surface.mesh import Surface
 from warpflat.garment.construction.constraints import FixedLength
 from warpflat.garment.construction.sew_pieces import sew_pieces
+from warpflat.garment.construction.straight_band import find_band
 
 
 def _strip(
