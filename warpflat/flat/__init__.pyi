@@ -159,8 +159,6 @@ from .surface.overlap import OVERLAP as OVERLAP
 from .surface.overlap import overlap_width as overlap_width
 from .surface.overlap import overlapping as overlapping
 from .surface.overlap import parted as parted
-from .surface.paths.border import SIDES as SIDES
-from .surface.paths.border import line_on_border as line_on_border
 from .surface.paths.edge_paths import are_joined as are_joined
 from .surface.paths.edge_paths import as_vertex as as_vertex
 from .surface.paths.edge_paths import path_length as path_length

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from warpflat.app.scene.border import SIDES, line_on_border
 from warpflat.app.scene.load import Scene, errors_named, expand_variables
 from warpflat.app.scene.schema import (
     BorderTable,
@@ -15,13 +16,11 @@ from warpflat.app.scene.schema import (
 )
 from warpflat.core import InputError, IntArray, guarded, nearest
 from warpflat.flat import (
-    SIDES,
     RawMesh,
     Surface,
     line_between,
     line_from_curve,
     line_from_indices,
-    line_on_border,
     line_on_plane,
     read_mesh_file,
     surface_of_file,

@@ -7,15 +7,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.polyline import arc_lengths, polyline_length, segment_lengths
-from warpflat.flat.surface.connectivity import border_loops
-from warpflat.flat.surface.half_edges import half_edges_of
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.normals import area_vectors
-from warpflat.flat.surface.paths.edge_paths import as_vertex
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest, polyline_length, segment_lengths
+from warpflat.flat import Surface, area_vectors, as_vertex, border_loops, half_edges_of, triangulate
 
 __all__ = ["SIDES", "line_on_border", "viewing_frame"]
 

@@ -39,6 +39,14 @@ def grid(columns: int, rows: int, place: Place = plane) -> tuple[NDArray[np.floa
     return place(u.ravel(), v.ravel()), quads
 
 
+def rings(columns: int, rows: int) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Vertices around +Y ring by ring from below, with a radius of 1 m and a height of 2 m, and quads."""
+    i = np.arange(columns * rows, dtype=np.int32).reshape(rows, columns)
+    quads = np.stack([i[:-1], np.roll(i[:-1], -1, 1), np.roll(i[1:], -1, 1), i[1:]], axis=-1).reshape(-1, 4)
+    angle = np.tile(2 * np.pi * np.arange(columns) / columns, rows)
+    return np.stack([np.sin(angle), np.repeat(np.linspace(0, 2, rows), columns), np.cos(angle)], axis=-1), quads
+
+
 def scattered(
     count: int, place: Place, seed: int = 0
 ) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32]]:
