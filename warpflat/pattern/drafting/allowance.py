@@ -16,7 +16,15 @@ from warpflat.core import FloatArray, InputError
 from warpflat.pattern.drafting.dart_allowance import dart_allowance
 from warpflat.pattern.drafting.hem_allowance import fold_hem
 from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT
-from warpflat.pattern.drafting.polygons import LOST, close_slits, half_plane, intersection, union, unit_vector
+from warpflat.pattern.drafting.polygons import (
+    LOST,
+    close_slits,
+    half_plane,
+    intersection,
+    outer_ring,
+    union,
+    unit_vector,
+)
 from warpflat.pattern.drafting.sides import MITRE_REACH, Side, Wedge, allowance_strip, corner_fill, outline_points
 
 if TYPE_CHECKING:
@@ -92,8 +100,7 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
     pockets = [shapely.Polygon(ring) for ring in polygon.interiors]
     if any(pocket.area > 1e-6 for pocket in pockets):
         notes.append("allowances on two sides of a narrow gap meet and close it: make them narrower there")
-    ring = shapely.simplify(shapely.Polygon(polygon.exterior), 2e-6)
-    points = np.asarray(shapely.orient_polygons(ring).exterior.coords)[:-1]
+    points = outer_ring(shapely.simplify(shapely.Polygon(polygon.exterior), 2e-6))
     return CutOutline(points=points, notes=tuple(notes), prolonged=prolonged)
 
 
@@ -117,4 +124,4 @@ def cut_hole(ring: FloatArray, width: float) -> FloatArray | None:
     inner = intersection(inner, wide)
     if inner.geom_type != "Polygon" or inner.area <= LOST:
         return None
-    return np.asarray(shapely.orient_polygons(shapely.simplify(inner, 2e-6)).exterior.coords)[:-1]
+    return outer_ring(shapely.simplify(inner, 2e-6))

@@ -24,6 +24,7 @@ __all__ = [
     "mapped",
     "mirror_image",
     "normal_towards",
+    "outer_ring",
     "parallelogram",
     "polygons_only",
     "reflect",
@@ -129,6 +130,14 @@ def half_plane(start: FloatArray, end: FloatArray, reach: float) -> Polygon:
     direction = unit_vector(end - start)
     left = np.array([-direction[1], direction[0]])
     return parallelogram(start, direction, (-reach, reach), left, (0.0, reach))
+
+
+def outer_ring(area: Geometry) -> FloatArray:
+    """Return the outer ring of the largest part of an area, counter-clockwise, #P by 2 [m]; the first point is not repeated."""
+    import shapely
+
+    largest = max(shapely.get_parts(area), key=lambda part: part.area)
+    return np.asarray(shapely.orient_polygons(shapely.Polygon(largest.exterior)).exterior.coords)[:-1]
 
 
 def signed_area(ring: FloatArray) -> float:
