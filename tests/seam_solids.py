@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import permutations
-from pathlib import Path
 
 import numpy as np
 
@@ -132,17 +131,6 @@ def skin(
         cloth = Cloth(vertices=cloth.vertices, faces=cloth.faces[~(beyond & near)])
     used, place = np.unique(cloth.faces, return_inverse=True)
     return make_surface(cloth.vertices[used], place.reshape(-1, 3), component="largest", closed=True, name="garment")
-
-
-def write(path: Path, *surfaces: Surface, more: Sequence[str] = ()) -> Path:
-    """Write surfaces as one OBJ [m], with more lines at its end, and return its path."""
-    lines, count = list[str](), 1
-    for surface in surfaces:
-        lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in surface.vertices.tolist()]
-        lines += ["f " + " ".join(str(v + count) for v in face if v >= 0) for face in surface.faces.tolist()]
-        count += len(surface.vertices)
-    path.write_text("\n".join([*lines, *more]) + "\n", encoding="utf-8")
-    return path
 
 
 def shirt(arm: float = 0.0, sleeve: float = 0.5, step: float = 0.03) -> Surface:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
-from warpflat.core import energy_words, format_count
+from warpflat.core import aligned, energy_words
 from warpflat.flat import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_names
 
 if TYPE_CHECKING:
@@ -24,15 +23,8 @@ __all__ = [
     "mannequin_table",
     "measures_table",
     "run_summary",
-    "warnings_of",
 ]
 
-# A seam or constraint that fails by more than this gets a warning [mm].
-_WARNED_MISS = 0.2
-# Cloth that is so far from its designed surface has fallen off the body [m].
-_FALLEN = 0.3
-# No cloth is worn stretched by more than this share.
-_TORN = 0.5
 _UNITS = {
     "areal_density": "kg/m2",
     "stiffness_warp": "N/m",
@@ -62,10 +54,10 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
                 f"{100 * piece['area_error']:.3g} %",
                 energy_words(piece["strain_energy_j"]),
                 f"{piece['flipped_faces']:,}",
-                "yes" if _converged(piece) else "NO",
+                "yes" if piece["stages"][-1]["converged"] else "NO",
             )
         )
-    tables = [_aligned(head, rows)]
+    tables = [aligned(head, rows)]
     from warpflat.flat import relaxation_words
 
     if relaxed := relaxation_words(piece["stages"] for piece in metrics["pieces"].values()):
@@ -84,7 +76,7 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
             )
             for seam in metrics["seams"]
         ]
-        tables.append(_aligned(columns, seams, left=(0, 1)))
+        tables.append(aligned(columns, seams, left=(0, 1)))
     if found := metrics.get("garment", {}).get("found_seams"):
         # What closing each seam would cost, per centimetre that is sewn.
         prices = [
@@ -98,12 +90,12 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
             )
             for seam in found
         ]
-        tables.append(_aligned(("found seam", "sewn", "releases", "per cm"), prices))
+        tables.append(aligned(("found seam", "sewn", "releases", "per cm"), prices))
     if metrics.get("constraints"):
         held = [
             (each["name"], f"{each['amiss_mm']:.2f} mm", _price(each["price_j"])) for each in metrics["constraints"]
         ]
-        tables.append(_aligned(("constraint", "amiss", "price"), held))
+        tables.append(aligned(("constraint", "amiss", "price"), held))
     if metrics.get("girths"):
         # Of the pattern with darts and seams closed, the ease got and wanted.
         parts = []
@@ -142,71 +134,6 @@ def _price(joules: float | None) -> str:
     return "" if joules is None else energy_words(joules, 3)
 
 
-def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
-    """Return a line for each fault of a piece, of every size: not converged, flipped faces, overlap; and for seams whose sides differ."""
-    lines, sewing = list[str](), metrics.get("sewing", {})
-    for name, piece in metrics["pieces"].items():
-        if not _converged(piece):
-            last = piece["stages"][-1]
-            asked = sewing.get("contradictory", False) and last["name"] == "sew"
-            remedy = "its seams and constraints ask for more than it can give" if asked else "raise max_steps"
-            # The work that `max_steps` limits: steps of the piece's mesh, or work units where coarser levels add to them.
-            steps, units = last["steps"], last["work_units"]
-            work = f"{steps:,} steps" if units <= steps else f"{units:,.0f} work units"
-            # Crushed faces make forces infinite; then the strain energy says how far from rest it has ended.
-            if last["residual"] is None or not math.isfinite(last["residual"]):
-                remainder = f"strain energy {energy_words(last['strain_energy_j'], 3)}"
-            else:
-                remainder = f"residual {last['residual']:.1e}"
-            lines.append(f"{name} did not converge within {work} ({remainder}); the pattern is not final: {remedy}")
-        if piece["flipped_faces"]:
-            lines.append(f"{name} has {piece['flipped_faces']:,} flipped faces; the pattern cannot be cut as it is")
-        if piece.get("overlap_m2"):
-            area = 1e6 * piece["overlap_m2"]
-            lines.append(f"{name} lies over itself by {area:.3g} mm2; the pattern cannot be cut as it is")
-    if not sewing.get("converged", True):
-        amiss = [(seam["name"], abs(seam["difference_mm"])) for seam in metrics["seams"]]
-        amiss += [(held["name"], held["amiss_mm"]) for held in metrics["constraints"]]
-        lines += [
-            f"{name} is amiss by {by:.2f} mm: more is asked than the pieces can keep together"
-            for name, by in amiss
-            if by > _WARNED_MISS
-        ]
-    drape = metrics.get("drape", {"converged": True})
-    if not drape["converged"]:
-        left = f"{100 * drape['residual']:.2g} % of a vertex's weight"
-        fallen = drape["distance_m"]["mean"] > _FALLEN
-        still = (
-            "its forces no longer fall: a finer spacing_mm or another cloth may help"
-            if drape["stalled"]
-            else "raise max_steps"
-        )
-        remedy = "it has slipped off its body: hold = [...] keeps lines in place" if fallen else still
-        lines.append(f"the drape is not at rest after {drape['steps']:,} steps ({left} is left): {remedy} in [drape]")
-    longest = max(
-        (drape[f"strain_{thread}"]["max"] for thread in ("warp", "weft") if f"strain_{thread}" in drape), default=0.0
-    )
-    if longest > _TORN:
-        lines.append(
-            f"the worn cloth is stretched by up to {100 * longest:.0f} %, which no cloth is: it is tangled, or far too small for this body"
-        )
-    pattern = metrics.get("pattern", {})
-    if differing := pattern.get("seams_that_differ"):
-        names = ", ".join(differing[:3]) + (f" and {len(differing) - 3} more" if len(differing) > 3 else "")
-        near = pattern["seam_difference_per_50mm_mm"]
-        over = "" if near is None else f" as a whole, and {near:.2f} mm over 50 mm"
-        lines.insert(
-            0,
-            f"the drawn sides of {format_count(len(differing), 'seam')} differ by up to {pattern['seam_difference_mm']:.2f} mm{over}: "
-            f"{names}; one side must be eased to the other there",
-        )
-    if refused := metrics.get("garment", {}).get("no_pattern"):
-        lines.insert(0, refused)
-    for size, other in metrics.get("sizes", {}).items():
-        lines += [f"size {size}: {line}" for line in warnings_of(other)]
-    return lines
-
-
 def drape_lines(metrics: Mapping[str, Any]) -> list[str]:
     """Return what a drape has found, a sentence a line; none without one."""
     if "drape" not in metrics:
@@ -228,19 +155,15 @@ def mannequin_table(source: str, levels: Mapping[str, Level], difference: SizeDi
         levels: by name.
         difference: of a scan to the nearest size.
     """
-    if difference is None:
-        rows = [(name, f"{100 * level.height:.1f} cm", f"{100 * level.girth:.1f} cm") for name, level in levels.items()]
-        return f"{source}\n{_aligned(('level', 'height', 'girth'), rows)}"
-    head = ("level", "height", "girth", "section", "height over size", "girth over size")
-    full = [
-        (
-            name, f"{100 * level.height:.1f} cm", f"{100 * level.girth:.1f} cm",
-            "" if level.section is None else f"{100 * level.section:.1f} cm",
-            _more(difference.heights, name), _more(difference.girths, name),
-        )
-        for name, level in levels.items()
-    ]  # fmt: skip
-    return f"{source}; nearest size {difference.size}\n{_aligned(head, full)}"
+    head = ["level", "height", "girth"]
+    rows = [[name, f"{100 * level.height:.1f} cm", f"{100 * level.girth:.1f} cm"] for name, level in levels.items()]
+    if difference is not None:
+        source += f"; nearest size {difference.size}"
+        head += ["section", "height over size", "girth over size"]
+        for row, (name, level) in zip(rows, levels.items(), strict=True):
+            section = "" if level.section is None else f"{100 * level.section:.1f} cm"
+            row += [section, _more(difference.heights, name), _more(difference.girths, name)]
+    return f"{source}\n{aligned(head, rows)}"
 
 
 def measures_table(measures: Mapping[str, ScanMeasure], difference: SizeDifference) -> str:
@@ -258,7 +181,7 @@ def measures_table(measures: Mapping[str, ScanMeasure], difference: SizeDifferen
         )
         for name, m in measures.items()
     ]  # fmt: skip
-    return _aligned(head, rows)
+    return aligned(head, rows)
 
 
 def _more(of: Mapping[str, float], name: str) -> str:
@@ -289,7 +212,7 @@ def ledger_table(ledger: Ledger) -> str:
     note = "released and left: model energy of the pieces that it changes, relaxed coarsely"
     both = "; both sides of the body are cut" if any(entry.cut for entry in ledger.entries) else ""
     refused = [f"not possible: {name} ({reason})" for name, reason in ledger.refused]
-    return "\n".join([*peaks, _aligned(head, rows, left=(1,)), f"{note}{both}", *refused])
+    return "\n".join([*peaks, aligned(head, rows, left=(1,)), f"{note}{both}", *refused])
 
 
 def edit_table(edit: Mapping[str, Any]) -> str:
@@ -304,7 +227,7 @@ def edit_table(edit: Mapping[str, Any]) -> str:
     for name in dict.fromkeys((*before["mouths_m"], *after["mouths_m"])):
         widths = (each["mouths_m"].get(name) for each in (before, after))
         rows.append((name, *("-" if width is None else f"{1e3 * width:.1f} mm" for width in widths)))
-    return _aligned(("", "before", "after"), rows)
+    return aligned(("", "before", "after"), rows)
 
 
 def fabric_table(fabrics: Sequence[Fabric]) -> str:
@@ -338,7 +261,7 @@ def fabric_table(fabrics: Sequence[Fabric]) -> str:
         *([f"also known: {', '.join(also)}"] if also else []),
         f"default: {DEFAULT_FABRIC}; test loads and sources: warpflat fabrics NAME",
     ]
-    return "\n".join([_aligned(head, rows, left=(0, 9)), "", *notes])
+    return "\n".join([aligned(head, rows, left=(0, 9)), "", *notes])
 
 
 def fabric_sheet(fabric: Fabric) -> str:
@@ -360,7 +283,7 @@ def fabric_sheet(fabric: Fabric) -> str:
     parts = [f"{fabric.name}: {fabric.description}" if fabric.description else fabric.name]
     if fabric.aliases:
         parts.append(f"also: {', '.join(fabric.aliases)}")
-    parts += ["", _aligned(("value", "", "unit", "test load", "grade", "source"), rows, left=(0, 2, 3, 4, 5))]
+    parts += ["", aligned(("value", "", "unit", "test load", "grade", "source"), rows, left=(0, 2, 3, 4, 5))]
     for key in ("curve_warp", "curve_weft"):
         if points := getattr(fabric, key):
             text = ", ".join(f"{100 * strain:.3g} %: {tension:.3g} N/m" for strain, tension in points)
@@ -377,25 +300,8 @@ def fabric_data(fabric: Fabric) -> dict[str, Any]:
     return {**data, "provenance": {key: asdict(origin) for key, origin in fabric.provenance.items()}}
 
 
-def _converged(piece: Mapping[str, Any]) -> bool:
-    return all(stage["converged"] for stage in piece["stages"][-1:])
-
-
 def _estimate_sign(fabric: Fabric, key: str) -> str:
     origin = fabric.provenance.get(key)
     if origin is None:
         return ""
     return "~" if origin.is_estimate else ">" if origin.at_least else ""
-
-
-def _aligned(head: Sequence[str], rows: Sequence[Sequence[str]], *, left: Sequence[int] = (0,)) -> str:
-    """Align rows in columns under their heads, to the right but for the columns listed in `left`."""
-    table = [head, *rows]
-    widths = [max(len(row[column]) for row in table) for column in range(len(head))]
-    return "\n".join(
-        "  ".join(
-            cell.ljust(width) if column in left else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in table
-    )

@@ -228,8 +228,6 @@ def _largest_move(before: NDArray[np.float32], after: NDArray[np.float32]) -> fl
 
 # The file of the mannequin, to which that of the frames refers.
 MANNEQUIN = "mannequin.usdc"
-# The mannequin is shown this much smaller [m], so that cloth that lies on it is seen.
-_SHRUNK = 0.002
 
 # Frames of a film of 60: so many for a stage after the first one at least, and so many in which the line of a cut is shown.
 _LATER, _LINE = 15 / 60, 6 / 60
@@ -276,10 +274,9 @@ class Film:
         self._open = ExitStack()
         self._keys: KeyFile | None = None
         self._folder, self._output = folder, output
-        self._most = max(_MOST_VERTICES // max(sum(len(surface.vertices) for surface in surfaces), 1), 3)
-        self.wanted = output.frames > 0
         self._surfaces = {surface.name: surface for surface in surfaces}
         vertices = sum(len(surface.vertices) for surface in surfaces)
+        self._most = max(_MOST_VERTICES // max(vertices, 1), 3)
         self._all_stored = not output.compact_film and vertices * max(output.frames, 1) <= _MOST_STORED
         schedule = partial(FrameSchedule, output, at_most=self._most)
         self.recorders = {name: FrameRecorder(surface, schedule) for name, surface in self._surfaces.items()}
@@ -290,7 +287,7 @@ class Film:
         Raises:
             InputError: the place cannot be written.
         """
-        if self.wanted:
+        if self._output.frames > 0:
             with optional_file(self._folder / "frames.usdc", []):
                 self._keys = self._open.enter_context(KeyFile(self._folder))
                 for recorder in self.recorders.values():
@@ -317,14 +314,12 @@ class Film:
                     break
             with FrameWriter(path, scale=scale) as writer:
                 if self._mannequin is not None:
-                    from warpflat.flat import vertex_normals
                     from warpflat.garment import Body, write_mannequin_usd
 
                     write_mannequin_usd(self._mannequin, self._folder / MANNEQUIN)
                     layout = self._mannequin.layout
-                    normals = vertex_normals(self._mannequin.vertices, layout.faces[layout.on_body])
-                    writer.refer_to_body(MANNEQUIN, self._mannequin.vertices - _SHRUNK * normals)
                     body = Body(self._mannequin.vertices, layout.faces[layout.on_body], device=wp.get_device("cpu"))
+                    writer.refer_to_body(MANNEQUIN, body.shrunk)
                 for name, surface in self._surfaces.items():
                     writer.add_piece(name, surface)
                 if self.drafted:

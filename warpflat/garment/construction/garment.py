@@ -11,7 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core import FloatArray, IntArray, arc_lengths, file_in, optional_file, polyline_length
-from warpflat.flat import BorderSeam, CutPattern, Flattening, mirror_images, run_metrics, separate
+from warpflat.flat import Flattening, run_metrics, separate
+from warpflat.garment.construction.border_seams import BorderSeam
+from warpflat.garment.construction.laid_as_cut import CutPattern
+from warpflat.garment.construction.mirror import mirror_images
 from warpflat.garment.construction.sewn import MeasuredSeam, Sewn, Stitching
 
 if TYPE_CHECKING:

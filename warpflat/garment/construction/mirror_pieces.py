@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from warpflat.core import FloatArray, arc_lengths
-from warpflat.flat import mirror_plane
+from warpflat.garment.construction.mirror import mirror_plane
 from warpflat.pattern import Pattern, Piece, Seam, SeamSide
 
 if TYPE_CHECKING:

@@ -18,6 +18,7 @@ from warpflat.flat import (
     area_vectors,
     border_loops,
     euler_characteristic,
+    flat_areas,
     half_edges,
     join_labels,
     mean_normals,
@@ -81,7 +82,7 @@ class TriangleMesh:
     @cached_property
     def face_areas(self) -> FloatArray:
         """#F [m2]."""
-        return np.linalg.norm(self.area_vectors, axis=1)
+        return flat_areas(self.vertices, self.faces)
 
     @cached_property
     def face_normals(self) -> FloatArray:
@@ -117,8 +118,6 @@ class TriangleMesh:
             vertices=self.vertices,
             faces=np.column_stack([self.faces, np.full(len(self.faces), -1)]).astype(np.int32),
             name=name,
-            input_vertices=self.vertices,
-            input_index=np.arange(len(self.vertices), dtype=np.int32),
         )
 
     def connected(self, joined: Callable[[Ids, Ids], BoolArray]) -> Ids:

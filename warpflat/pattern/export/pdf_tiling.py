@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.core import FloatArray
-from warpflat.pattern.drafting.draft import nest_label
-from warpflat.pattern.drafting.layout import Sheet
+from warpflat.pattern.drafting.layout import Sheet, covered_rings
+from warpflat.pattern.drafting.words import letters_of
 
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon
 
-__all__ = ["LEGEND_SIZE", "SIZE_COLOURS", "SIZE_DASHES", "Paper", "Tiling", "make_tiling"]
+__all__ = ["LEGEND_SIZE", "SIZE_DASHES", "Paper", "Tiling", "make_tiling"]
 
 #: Dashes [mm] by which sizes are told apart on paper, also without colour.
 SIZE_DASHES: tuple[tuple[float, ...], ...] = (
@@ -26,9 +26,6 @@ SIZE_DASHES: tuple[tuple[float, ...], ...] = (
     (6, 1.5, 1, 1.5, 1, 1.5),
     (14, 3),
 )
-
-
-SIZE_COLOURS = ("#000000", "#0060a8", "#b8460b", "#5b2a86", "#00766c", "#8a6d00", "#9b1b5a")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,18 +99,19 @@ class Tiling:
         """What no sheet shows, around all that is shown."""
         import shapely
 
-        corners = [self.corner(*tile) for tile in self.tiles]
-        shown = shapely.union_all([shapely.box(*at, *(at + self.paper.step + self.paper.overlap)) for at in corners])
+        shown = shapely.union_all([self.window(tile) for tile in self.tiles])
         return shown.buffer(0.1, join_style="mitre").difference(shown)
+
+    def window(self, tile: tuple[int, int]) -> Polygon:
+        """Return what a tile shows of the sheet."""
+        import shapely
+
+        corner = self.corner(*tile)
+        return shapely.box(*corner, *(corner + self.paper.step + self.paper.overlap))
 
     def name(self, row: int, column: int) -> str:
         """Return the name of a tile, such as "B3" for the second row and the third column."""
-        letters = ""
-        row += 1
-        while row:
-            row, digit = divmod(row - 1, 26)
-            letters = chr(ord("A") + digit) + letters
-        return f"{letters}{column + 1}"
+        return f"{letters_of(row)}{column + 1}"
 
 
 #: Width and height [m] of the legend's block.
@@ -131,19 +129,19 @@ def make_tiling(sheet: Sheet, paper: Paper) -> Tiling:
     rows = max(1, int(np.ceil((sheet.size[1] - paper.overlap) / step[1] - 1e-9)))
     tiling = Tiling(paper=paper, rows=rows, columns=columns, tiles=(), sheet=sheet)
     # What is drawn: pieces, labels beside them, the reserved block.
-    shapes = [shapely.Polygon(placed.on_sheet(piece.cut_line)) for placed in sheet.placed for piece in placed.pieces]
-    labels = [(nest_label(placed.pieces), placed) for placed in sheet.placed]
-    shapes += [shapely.Polygon(placed.on_sheet(label.box)) for label, placed in labels if label.leader is not None]
+    shapes = [
+        shapely.Polygon(placed.on_sheet(ring)) for placed in sheet.placed for ring in covered_rings(placed.pieces)
+    ]
     if sheet.reserved is not None:
         shapes.append(shapely.box(*sheet.reserved, *(sheet.reserved + LEGEND_SIZE)))
     # The tiles on which a part of a shape lies that no other tile shows.
     # Lines are drawn with their middle on the border.
     drawn = shapely.union_all([shape.buffer(LINE) for shape in shapes])
     tiles = [(row, column) for row in range(tiling.rows) for column in range(tiling.columns)]
-    parts = {tile: drawn.intersection(_window(tiling, tile)) for tile in tiles}
+    parts = {tile: drawn.intersection(tiling.window(tile)) for tile in tiles}
     kept = {tile for tile, part in parts.items() if part.area > 0.0}
     for tile in sorted(kept, key=lambda tile: (parts[tile].area, tile)):
-        around = [_window(tiling, other) for other in kept - {tile} if max(np.abs(np.subtract(other, tile))) == 1]
+        around = [tiling.window(other) for other in kept - {tile} if max(np.abs(np.subtract(other, tile))) == 1]
         if parts[tile].difference(shapely.union_all(around)).area < 1e-9:
             kept.remove(tile)
     shown = tuple(tile for tile in tiles if tile in kept)
@@ -153,11 +151,3 @@ def make_tiling(sheet: Sheet, paper: Paper) -> Tiling:
     return replace(
         tiling, tiles=shown, joined=any(sum(cell.intersects(shape) for cell in cells) > 1 for shape in shapes)
     )
-
-
-def _window(tiling: Tiling, tile: tuple[int, int]) -> Polygon:
-    """Return what a tile shows of the sheet."""
-    import shapely
-
-    corner = tiling.corner(*tile)
-    return shapely.box(*corner, *(corner + tiling.paper.step + tiling.paper.overlap))
