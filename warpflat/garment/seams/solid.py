@@ -28,7 +28,7 @@ from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 from warpflat.core import FloatArray, IntArray, polyline_length, unit
 from warpflat.flat import border_loops, inner_borders
 from warpflat.garment.seams.anatomy import HOLE, Anatomy
-from warpflat.garment.seams.cloth import ALIKE, SAME_WAY, Cloth, PieceMesh, section
+from warpflat.garment.seams.cloth import SAME_WAY, Cloth, PieceMesh, section
 from warpflat.garment.seams.fields import TriangleMesh
 from warpflat.garment.seams.symmetric import mirror_image, mirrored
 
@@ -68,15 +68,20 @@ _SMOOTH = 0.04
 # A cut pays for itself: a seam as long as the part is wide counts as this strain. So does a cut of a round part that leaves parts which
 # are not alike, as these are drawn once.
 _SEAM = 0.005
+# Areas of parts of a round part are alike within the first share, and a part is as long along two of its axes within the second: then those
+# of space serve.
+_ALIKE, _ROUND = 0.03, 0.05
+# A field is its own mirror image from this cosine on.
+_ITSELF = 0.99
 # Where cloth faces an axis by more than this (cosine) it is a base.
 _BASE = 0.6
 # The border of a panel squared is at least this share of a disk's; a cap's is shorter.
 _PANEL = 0.8
 # Limbs are looked for around so many places, far from one another.
 _TIPS = 16
-# In a limb lies the curvature of half a ball, 2 pi, within this share of pi; its root is the ring in which less is left, and the cloth
-# beyond takes it away, but for this: the toe of a sock is no limb.
-_OFF = 0.4
+# In a limb lies the curvature of half a ball, 2 pi, but for this share of pi; its root is the ring where the second share is lost, and the
+# cloth beyond takes all of it but the second share: the toe of a sock is no limb.
+_OFF, _LOST = 0.3, 0.5
 # The ring around a limb squared is at most this share of a disk's of the limb's area; what is a larger share of the whole is its trunk.
 _LIMB, _TRUNK = 0.35, 0.25
 # Parts at most, and how many more for each limb.
@@ -324,8 +329,8 @@ def _limbs(mesh: PieceMesh, mirror: Anatomy | None) -> tuple[FloatArray, int]:
         order = np.argsort(far)
         inside = np.cumsum(curvature[order])[: int(np.isin(order, rim).argmax()) if len(rim) else None] / np.pi
         grown = np.flatnonzero(inside > 2.0 - _OFF)
-        lost = grown[0] + np.flatnonzero(inside[grown[0] :] < 2.0 - _OFF) if len(grown) else grown
-        if len(lost) == 0 or inside[lost[0] :].min() > _OFF or np.abs(inside[: lost[0]] - 1.0).max() > 1.0 + _OFF:
+        lost = grown[0] + np.flatnonzero(inside[grown[0] :] < 2.0 - _LOST) if len(grown) else grown
+        if len(lost) == 0 or inside[lost[0] :].min() > _LOST or np.abs(inside[: lost[0]] - 1.0).max() > 1.0 + _OFF:
             continue
         field = far[order[lost[0]]] - far
         length = section(whole, field, np.ones(len(mesh.faces), dtype=bool))[0]
@@ -371,7 +376,7 @@ def _ways(mesh: PieceMesh, mirror: Anatomy | None) -> Iterator[_Way]:
     centre = share @ middles
     values, vectors = np.linalg.eigh(((middles - centre) * share[:, None]).T @ (middles - centre))
     axes = vectors.T
-    same = values[1:] <= (1.0 + ALIKE) * values[:-1]
+    same = values[1:] <= (1.0 + _ROUND) * values[:-1]
     if same.all():
         axes = np.eye(3)
     elif same.any():
@@ -439,7 +444,7 @@ def _best_way(
     for way in _ways(mesh, None if image is None else mirror) if neck is None else [_across_neck(mesh, neck)]:
         if image is not None:
             other = way.field[image]
-            alike = abs(float(way.field @ other)) > SAME_WAY * float(np.linalg.norm(way.field) * np.linalg.norm(other))
+            alike = abs(float(way.field @ other)) > _ITSELF * float(np.linalg.norm(way.field) * np.linalg.norm(other))
             if neck is None and not alike:
                 continue
             if not alike:
@@ -455,7 +460,7 @@ def _best_way(
         if len(parts) == 1 or min(areas) < 0.3 * _LEAST * total:
             continue
         cost = _SEAM * made.seam_length("way") / np.sqrt(sum(areas)) + sum(_topology(part) for part in parts)
-        cost += _SEAM * way.round * (max(areas) > (1.0 + ALIKE) * min(areas))
+        cost += _SEAM * way.round * (max(areas) > (1.0 + _ALIKE) * min(areas))
         cost += sum(_strain(part, known) * area for part, area in zip(parts, areas, strict=True)) / sum(areas)
         found.append((cost, made, way.field))
     best: tuple[float, FloatArray] | None = None
