@@ -14,7 +14,7 @@ from warpflat.core import FloatArray, size_words
 from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.pieces import Piece
 from warpflat.pattern.drafting.polygons import rotation
-from warpflat.pattern.drafting.words import translate
+from warpflat.pattern.drafting.words import as_sentence, translate
 
 if TYPE_CHECKING:
     from reportlab.pdfbase.ttfonts import TTFont
@@ -166,8 +166,7 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
     """Return what a label says: name, size, how to cut the piece, cloth, included allowances, garment."""
     lines = [piece.printed_name.upper()]
     if piece.size:
-        words = printed_size(piece.size)
-        lines.append(words[0].upper() + words[1:])
+        lines.append(as_sentence(printed_size(piece.size)))
     lines.append(cutting_words(piece) + (f" - {piece.fabric}" if piece.fabric else ""))
     lines += [
         f"{cutting_words(replace(piece, quantity=count, also={}))} - {cloth}" for cloth, count in piece.also.items()
