@@ -13,7 +13,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, FloatArray
+from warpflat.core import BoolArray, FloatArray, IntArray
+from warpflat.flat import join_labels
 from warpflat.garment.mannequin.body_model import BodyModel, finer_body
 
 __all__ = [
@@ -106,14 +107,9 @@ def model_places() -> Places:
     )
 
 
-def parts_of(triangles: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+def parts_of(triangles: NDArray[np.int64], count: int) -> IntArray:
     """Return #count, a label for each vertex, the same for vertices that triangles join."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    ends = np.concatenate([triangles[:, :2], triangles[:, 1:]])
-    graph = coo_array((np.ones(len(ends)), ends.T), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1])
+    return join_labels(count, *np.concatenate([triangles[:, :2], triangles[:, 1:]]).T)
 
 
 def meeting(vertices: FloatArray, mean: FloatArray, sign: float) -> int:

@@ -42,8 +42,6 @@ __all__ = [
 FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
 #: Height of capitals over the font's size.
 CAPITALS = 0.729
-#: Width over the font's size of letters that the font lacks: in other fonts they are no wider than their body.
-UNKNOWN = 1.0
 #: Height of capitals [m]: the piece's name, the other lines; and the distance of lines as a multiple of it.
 TITLE, TEXT, LEADING = 0.007, 0.0045, 1.55
 #: Height of letters with tails below, over that of capitals.
@@ -95,8 +93,9 @@ def embedded_font(name: str) -> TTFont:
 
 def text_width(text: str, height: float, *, bold: bool = False) -> float:
     """Return the width [m] of one line whose capitals are `height` [m] high."""
-    widths = embedded_font(BOLD if bold else FONT).face.charWidths  # in thousandths of the font's size
-    return sum(widths.get(ord(letter), 1000 * UNKNOWN) / 1000 for letter in text) * height / CAPITALS
+    # In thousandths of the font's size; letters that the font lacks are, in other fonts, no wider than their body.
+    widths = embedded_font(BOLD if bold else FONT).face.charWidths
+    return sum(widths.get(ord(letter), 1000) / 1000 for letter in text) * height / CAPITALS
 
 
 def wrap_text(text: str, height: float, width: float, *, bold: bool = False) -> str:
