@@ -34,6 +34,8 @@ __all__ = [
     "tools",
 ]
 
+# Seams are as long as each other up to this difference [mm].
+_ONE_LENGTH = 0.1
 #: A corner of a piece of cloth: its name, whether it is turned over, its copy, and the number of the edge that begins there.
 Corner = tuple[str, bool, int, int]
 
@@ -342,10 +344,15 @@ class _Workshop(SewingTasks):
 
         waits = {task: sum(task in other.needs for other in self.tasks if other.seams) for task in self.tasks}
 
+        # Seams that differ by less than a tenth of a millimetre are sewn in the pattern's order, whatever the rounding.
+        rank, before = {0.0: 0}, 0.0
+        for length in sorted(first for first, _ in self.lengths.values()):
+            rank[length] = rank[before] + (length - before > _ONE_LENGTH)
+            before = length
+
         def key(task: Task) -> tuple[object, ...]:
-            # To a tenth of a millimetre: seams of one length are sewn in the pattern's order, whatever the rounding.
             length = self.lengths.get(task.seams[0].name, (0.0, 0.0))[0] if task.seams else 0.0
-            return (*shape(task), -waits[task], round(length, 1), number[task])
+            return (*shape(task), -waits[task], rank[length], number[task])
 
         while ready:
             first = min(ready, key=key)
