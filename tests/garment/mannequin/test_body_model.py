@@ -14,8 +14,8 @@ from scans import needs_bodies, posed_body, scan, scanned_body, triangles_of
 from warpflat.core.errors import InputError
 from warpflat.garment.mannequin.body_landmarks import PLACES, height_weights
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation
+from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.common_body import common_body_of_scan
-from warpflat.garment.mannequin.fit_body import Mesh
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.scan_pose import LANDMARKS, ScanOptions
 from warpflat.garment.mannequin.stand_body import StandingBody, stand_body
@@ -64,34 +64,6 @@ def test_another_pose_keeps_what_lies_on_the_body() -> None:
     assert mesh.is_winding_consistent
     assert mesh.volume > 0.02
     assert not len(trimesh.grouping.group_rows(mesh.edges_sorted, require_count=1))
-
-
-def test_nearest_places_are_those_of_a_search_over_all_triangles() -> None:
-    random = np.random.default_rng(3)
-    vertices, triangles = random.normal(size=(60, 3)), random.permutation(60).reshape(20, 3)
-    points = random.normal(size=(50, 3))
-    found, weights, places = Mesh(vertices, triangles).closest(points)
-    given = trimesh.Trimesh(vertices, triangles, process=False)
-    for point, face, weight, place in zip(points, found, weights, places, strict=True):
-        each = trimesh.triangles.closest_point(given.triangles, np.tile(point, (20, 1)))
-        far = np.linalg.norm(each - point, axis=1)
-        assert np.linalg.norm(place - point) == pytest.approx(far.min(), abs=1e-5)
-        assert far[face] == pytest.approx(far.min(), abs=1e-5)
-        np.testing.assert_allclose(weight @ vertices[triangles[face]], place, atol=1e-5)
-
-
-def test_a_place_on_an_edge_has_one_normal_whichever_triangle_it_is_told_of() -> None:
-    # Two faces of a roof; vertex normals by area.
-    roof = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, -1.0, 0.0], [-1.0, -2.0, 0.0]])
-    mesh = Mesh(roof, np.array([[0, 1, 2], [1, 0, 3]]))
-    weights = np.array([[0.3, 0.7, 0.0], [0.7, 0.3, 0.0]])
-    first, second = mesh.normals_at(np.array([0, 1]), weights)
-    np.testing.assert_allclose(first, second, atol=1e-15)
-    assert np.linalg.norm(first) == pytest.approx(1.0)
-    assert mesh.normals[0] @ mesh.normals[1] < 0.5
-    # Inside a triangle it is nearer to that one's own.
-    inside = mesh.normals_at(np.array([0]), np.array([[0.2, 0.2, 0.6]]))[0]
-    assert inside @ mesh.normals[0] > first @ mesh.normals[0] + 0.01
 
 
 @pytest.mark.parametrize("arms", [0.8, -0.5])

@@ -298,7 +298,7 @@ class FitJob:
         from scipy.spatial import cKDTree
 
         from warpflat.flat import plane_sections, triangulate
-        from warpflat.garment import Closest
+        from warpflat.garment import Mesh
 
         layers = self.read.layers
         now = [
@@ -309,13 +309,13 @@ class FitJob:
         triangles = np.concatenate(
             [triangulate(layer.faces)[0] + start for layer, start in zip(layers, starts, strict=False)]
         ).astype(np.int64)
-        closest = Closest(np.concatenate([layer.vertices for layer in layers]), triangles)
+        worn = Mesh(np.concatenate([layer.vertices for layer in layers]), triangles)
         everywhere = np.concatenate(now)
 
         def moved(places: Sequence[Any]) -> list[Any]:
             """Return places of the file, points [m] or vertices, on the carried cloth."""
             points = np.array([place for place in places if not isinstance(place, int)], dtype=float).reshape(-1, 3)
-            triangle, weights, _ = closest(points)
+            triangle, weights, _ = worn.closest(points)
             there = iter(np.einsum("pk,pka->pa", weights, everywhere[triangles[triangle]]).tolist())
             return [place if isinstance(place, int) else next(there) for place in places]
 

@@ -14,7 +14,8 @@ from warpflat.core import FloatArray
 from warpflat.flat import triangulate
 from warpflat.garment.mannequin.body_landmarks import model_places, near_level, value_at
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body
-from warpflat.garment.mannequin.fit_body import Mesh, fit_body
+from warpflat.garment.mannequin.closest import Mesh
+from warpflat.garment.mannequin.fit_body import fit_body
 from warpflat.garment.mannequin.fit_inside import fit_inside
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.read_body import read_body

@@ -18,7 +18,8 @@ from warpflat.core import BoolArray, FloatArray
 from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.body_landmarks import LEVELS, crotch_vertex, meeting, model_places, near_level, value_at
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation, rotation_vector
-from warpflat.garment.mannequin.fit_body import FittedBody, Mesh, fit_body
+from warpflat.garment.mannequin.closest import Mesh
+from warpflat.garment.mannequin.fit_body import FittedBody, fit_body
 
 __all__ = ["StandingBody", "lay_on_scan", "stand_body"]
 
