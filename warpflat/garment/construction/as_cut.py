@@ -16,6 +16,7 @@ from warpflat.flat import (
     Fabric,
     SewnPanel,
     Surface,
+    area_vectors,
     as_fabric,
     distances_laid,
     laid_as_cut,
@@ -124,10 +125,7 @@ def worn_at(worn: Mapping[str, tuple[FloatArray, IntArray]], seams: Sequence[Sea
         seams: between them.
     """
     middle = {name: points[corners].mean(axis=1) for name, (points, corners) in worn.items()}
-    vector = {
-        name: np.cross(points[corners[:, 1]] - points[corners[:, 0]], points[corners[:, 2]] - points[corners[:, 0]])
-        for name, (points, corners) in worn.items()
-    }
+    vector = {name: area_vectors(points, corners) for name, (points, corners) in worn.items()}
     every = np.concatenate(list(middle.values()))
     centre = 0.5 * (every[:, 0].min() + every[:, 0].max())
     side = {}

@@ -141,8 +141,7 @@ def _chains(garment: FormGarment, called: str) -> Iterator[_Chain]:
             if line_name(edge) != called:
                 continue
             points, out = surface.vertices[ids], normals[ids]
-            beyond = np.cross(np.gradient(points, axis=0), out)
-            beyond /= np.maximum(np.linalg.norm(beyond, axis=1, keepdims=True), 1e-12)
+            beyond = unit(np.cross(np.gradient(points, axis=0), out))
             if ((points - surface.vertices.mean(axis=0)) * beyond).sum() < 0.0:
                 beyond = -beyond
             rows.append((points, out, beyond))

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core import FloatArray, find_unused_name, part_between
+from warpflat.core import FloatArray, find_unused_name, part_between, unit
 from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
 
 __all__ = [
@@ -64,7 +64,7 @@ _SHORT = 1e-3
 
 def direction(points: FloatArray) -> FloatArray:
     """Return the unit vector from the first point of a line to its last."""
-    return np.asarray((points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0]))
+    return unit(points[-1] - points[0])
 
 
 def joined(*lines: FloatArray) -> FloatArray:

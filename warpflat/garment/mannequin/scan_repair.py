@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from warpflat.core import BoolArray, FloatArray, InputError
-from warpflat.flat import components, half_edges, orient
+from warpflat.core import FloatArray, InputError, unit
+from warpflat.flat import area_vectors, components, face_normals, half_edges, mesh_edges, orient, vertex_normals
+from warpflat.garment.mannequin.slicer import plane_axes
 
 __all__ = ["close_holes", "smooth_noise", "turned_outward"]
 
@@ -43,12 +44,11 @@ def turned_outward(points: FloatArray, triangles: NDArray[np.int64]) -> tuple[ND
         faces = orient(faces)[0].astype(np.int64)
     edges = half_edges(faces)
     part = components(edges, barrier=edges.edges[edges.count > 2])
-    corners = points[faces[:, :3]]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = 0.5 * np.linalg.norm(cross, axis=1)
+    corners, vectors = points[faces[:, :3]], area_vectors(points, faces[:, :3])
+    area = np.linalg.norm(vectors, axis=1)
     areas = np.maximum(np.bincount(part, area), 1e-300)
     middle = np.stack([np.bincount(part, area * along) for along in corners.mean(axis=1).T], axis=1) / areas[:, None]
-    volume = np.bincount(part, np.einsum("ta,ta->t", cross, corners[:, 0] - middle[part]) / 6.0)
+    volume = np.bincount(part, np.einsum("ta,ta->t", vectors, corners[:, 0] - middle[part]) / 3.0)
     inward = volume < 0.0
     told = (areas > _PART * areas.sum()) & (np.abs(volume) > _BULKY * areas**1.5)
     for one in np.flatnonzero(told & inward & (areas < areas.max())):
@@ -87,9 +87,7 @@ def close_holes(
 
     Source: Liepa, "Filling holes in meshes", 2003 (fairing by the second-order umbrella operator).
     """
-    corners = points[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    normal = face_normals(points, triangles)
     span = float(np.ptp(points, axis=0).max())
     holes: list[tuple[float, FloatArray]] = []
     new_points, new_triangles, size = [points], [triangles], len(points)
@@ -101,7 +99,7 @@ def close_holes(
         is_hole = any(length <= longest * span and one_way >= least for longest, least in _HOLES)
         if not 3 <= len(loop) <= 1000 or not is_hole:
             continue
-        patch = _patch(rim, facing / np.linalg.norm(facing))
+        patch = _patch(rim, unit(facing))
         if patch is None:
             continue
         inner, filled = patch
@@ -156,13 +154,10 @@ def _patch(rim: FloatArray, facing: FloatArray) -> tuple[FloatArray, NDArray[np.
 
     None where the rim's shadow along `facing` crosses itself.
     """
+    import shapely
     from scipy.spatial import Delaunay, QhullError, cKDTree
 
-    middle = rim.mean(axis=0)
-    first = np.eye(3)[int(np.argmin(np.abs(facing)))]
-    first = first - facing * (first @ facing)
-    first /= np.linalg.norm(first)
-    axes = np.array([first, np.cross(facing, first)])
+    middle, axes = rim.mean(axis=0), plane_axes(facing)
     flat = (rim - middle) @ axes.T
     if len(rim) == 3:
         return np.empty((0, 3)), np.array([[0, 1, 2]])
@@ -174,7 +169,8 @@ def _patch(rim: FloatArray, facing: FloatArray) -> tuple[FloatArray, NDArray[np.
     x, y = np.meshgrid(np.arange(low[0], high[0], step), np.arange(low[1], high[1], 0.87 * step))
     x[1::2] += 0.5 * step
     grid = np.column_stack([x.ravel(), y.ravel()])
-    grid = grid[_inside(grid, flat)]
+    within = shapely.Polygon(flat)
+    grid = grid[shapely.contains_xy(within, grid)]
     # On the rim's edges, too, or a long edge would lie close to a vertex of the grid.
     halves = np.concatenate([flat, 0.5 * (flat + np.roll(flat, 1, axis=0))])
     grid = grid[cKDTree(halves).query(grid)[0] > 0.55 * step]
@@ -183,7 +179,7 @@ def _patch(rim: FloatArray, facing: FloatArray) -> tuple[FloatArray, NDArray[np.
     except (QhullError, ValueError):
         return None
     every = np.concatenate([flat, grid])
-    cells = cells[_inside(every[cells].mean(axis=1), flat)]
+    cells = cells[shapely.contains_xy(within, every[cells].mean(axis=1))]
     a, b, c = (every[cells[:, k]] for k in range(3))
     turn = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
     cells = np.where(turn[:, None] < 0.0, cells[:, ::-1], cells)[np.abs(turn) > 1e-12 * step * step]
@@ -193,16 +189,6 @@ def _patch(rim: FloatArray, facing: FloatArray) -> tuple[FloatArray, NDArray[np.
     is_rim = np.arange(len(every)) < len(flat)
     kept = is_rim | (np.bincount(cells.ravel(), minlength=len(every)) > 0)
     return middle + grid[kept[len(flat) :]] @ axes, (np.cumsum(kept) - 1)[cells].astype(np.int64)
-
-
-def _inside(points: FloatArray, polygon: FloatArray) -> BoolArray:
-    """Return which plane points lie inside a closed polygon, by the crossings of a ray to the right."""
-    (ax, ay), (bx, by) = polygon.T, np.roll(polygon, -1, axis=0).T
-    x, y = points[:, :1], points[:, 1:]
-    crosses = (ay > y) != (by > y)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at = ax + (y - ay) / (by - ay) * (bx - ax)
-    return np.asarray((crosses & (x < at)).sum(axis=1) % 2 == 1)
 
 
 def _fair(
@@ -264,22 +250,15 @@ def smooth_noise(points: FloatArray, triangles: NDArray[np.int64]) -> tuple[Floa
     """
     from scipy.sparse import coo_array
 
-    ends = np.concatenate([triangles[:, :2], triangles[:, 1:], triangles[:, ::2]])
-    ends = np.unique(np.sort(ends, axis=1), axis=0)
+    ends = mesh_edges(triangles)
     both = np.concatenate([ends, ends[:, ::-1]])
     size = len(points)
     degree = np.bincount(both[:, 0], minlength=size).astype(float)
     beside = np.linalg.norm(points[both[:, 0]] - points[both[:, 1]], axis=1)
     distance = np.bincount(both[:, 0], beside, minlength=size) / degree
     mean = coo_array((1.0 / degree[both[:, 0]], (both[:, 0], both[:, 1])), shape=(size, size)).tocsr()
-    corners = points[triangles]
-    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal = np.column_stack([
-        np.bincount(triangles.ravel(), np.repeat(facing[:, k], 3), minlength=size) for k in range(3)
-    ])  # fmt: skip
-    normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     # A curved skin stands off its neighbours' mean, too, but evenly: what differs from the neighbours is noise.
-    off = ((points - mean @ points) * normal).sum(axis=1)
+    off = ((points - mean @ points) * vertex_normals(points, triangles)).sum(axis=1)
     wavers = np.abs(off - mean @ off)
     if np.median(wavers / distance) < _WAVERS:
         return points, 0.0

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, arc_lengths, points_at_lengths
+from warpflat.core import FloatArray, InputError, arc_lengths, points_at_lengths, unit
 from warpflat.garment.mannequin.layout import Layout
 
 __all__ = [
@@ -206,7 +206,7 @@ def straighten_hems(
             for first, last in zip(sewn, [*sewn[1:], sewn[0] + arm.shape[1]], strict=True):
                 columns = np.arange(first, last + 1) % arm.shape[1]
                 flat = _unfolded(out[arm[(start + hem) // 2, columns]], out[arm[hem, columns]])
-                along = (flat[-1] - flat[0]) / np.linalg.norm(flat[-1] - flat[0])
+                along = unit(flat[-1] - flat[0])
                 further[columns] = (flat - flat[0]) @ [-along[1], along[0]]
             if hem > layout.arm_row["biceps"]:
                 further -= further[arm.shape[1] // 2]
