@@ -76,7 +76,7 @@ def test_a_fit_finds_a_person_of_the_model(arms: float) -> None:
     person = replace(person, bend=person.bend @ rotation(bend))
     wanted = model.vertices(person)
     wanted -= [0.0, wanted[:, 1].min(), 0.0]
-    stood = stand_body(wanted, model.triangles, len(model.triangles))
+    stood = stand_body(wanted, model.triangles)
     fit, plain = stood.fit, ~model.detail
     found = np.isfinite(fit.distance)
     assert found[plain].mean() > 0.98
@@ -94,10 +94,10 @@ def _height(laid: StandingBody, landmark: str) -> float:
 def test_the_fit_follows_a_landmark_that_is_given() -> None:
     points, faces = scan("female")
     points, triangles = points - [0.0, points[:, 1].min(), 0.0], triangles_of(faces)
-    free = stand_body(points, triangles, len(triangles))
+    free = stand_body(points, triangles)
     for name, up in {"waist": 0.03, "hip": -0.03, "elbow": 0.03, "armpit": -0.025, "crotch": -0.02}.items():
         wanted = _height(free, name) + up
-        laid = stand_body(points, triangles, len(triangles), landmarks={name: wanted})
+        laid = stand_body(points, triangles, landmarks={name: wanted})
         assert _height(laid, name) == pytest.approx(wanted, abs=0.004), name
         # The body slides within its skin.
         assert laid.unsure is None, name

@@ -373,7 +373,7 @@ def test_a_body_with_forty_holes_is_measured_as_the_whole_one() -> None:
     _, torn = copy_of_body(points, faces, "holes", 0.0, 0.0, 0.0)
     assert len(torn) < len(faces) - 500
     body, plain = on_scan(points, torn, 40.0), scanned_body("male")
-    assert any(note.startswith("holes closed by smooth patches") for note in body.notes)
+    assert any(note.startswith("holes, over which the body model's skin is taken") for note in body.notes)
     # Holes in hands, face and feet are too deep for what is told of them.
     for name, whole in plain.measures.items():
         if name.split(" ")[0] not in ("head", "hand", "foot"):

@@ -78,7 +78,6 @@ def read_body(vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptio
     laid = stand_body(
         scan.vertices,
         scan.triangles,
-        scan.scanned,
         faces_ahead=options.facing is not None,
         as_scanned=options.keep_pose and not scan.sits,
         sits=scan.sits,
@@ -91,17 +90,17 @@ def read_body(vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptio
         )
     posed, sits = laid.posed, scan.sits
     if laid.turned:
-        scan = Slicer(scan.vertices * [-1.0, 1.0, -1.0], scan.triangles, scan.noise, scan.scanned)
+        scan = Slicer(scan.vertices * [-1.0, 1.0, -1.0], scan.triangles, scan.noise)
         turn, shift = turn * [-1.0, 1.0, -1.0], shift * [-1.0, 1.0, -1.0]
         notes.append("the scan was found to face the other way by the body model")
     if sits:
         # What a tape would measure on the person standing.
-        scan = Slicer(laid.stood(scan.vertices), scan.triangles, scan.noise, scan.scanned)
+        scan = Slicer(laid.stood(scan.vertices), scan.triangles, scan.noise)
         scan.sits, laid = True, replace(laid, posed=laid.vertices)
     with whole_sections():
         crotch = options.landmarks.get("crotch") or _crotch_height(scan, laid)
         crotch -= float(laid.posed[laid.crotch, 1])
-        moved = Slicer(laid.stood(scan.vertices), scan.triangles, scan.noise, scan.scanned) if laid.moved else scan
+        moved = Slicer(laid.stood(scan.vertices), scan.triangles, scan.noise) if laid.moved else scan
         stands = BodySections(laid.vertices, laid, moved, crotch)
         body = BodySections(laid.posed, laid, scan, crotch) if laid.moved else stands
         found = levels = find_levels(body, laid, scan.noise, options.landmarks)

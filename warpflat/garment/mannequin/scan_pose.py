@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpflat.core import FloatArray, InputError, nearest, unit
 from warpflat.flat import join_labels, stray_vertex, stray_words
-from warpflat.garment.mannequin.scan_repair import close_holes, smooth_noise, turned_outward
+from warpflat.garment.mannequin.scan_repair import find_holes, smooth_noise, turned_outward
 from warpflat.garment.mannequin.slicer import UP, Slicer, plane_axes
 from warpflat.garment.mannequin.summit import summit
 
@@ -108,9 +108,9 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
             "scan: no face is left where vertices that lie at one place are joined; its places need more digits, or it lies too far from "
             "the origin"
         )
-    scanned, turned = turned_outward(welded, scanned)
-    points, triangles, holes = close_holes(welded, scanned)
-    points, noise = smooth_noise(points, triangles)
+    triangles, turned = turned_outward(welded, scanned)
+    holes = find_holes(welded, triangles)
+    points, noise = smooth_noise(welded, triangles)
     notes = [f"loose pieces of less than 1 % of the scan's faces were left out: {loose}"] if loose else []
     if turned:
         notes.append(f"faces of the scan that were wound inward were turned: {turned} of {len(scanned)}")
@@ -166,14 +166,14 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
         length, place = max(holes, key=lambda hole: hole[0])
         x, y, z = place @ frame.T * _UNITS[unit] + (new[0] - points[0] @ frame.T * _UNITS[unit])
         notes.append(
-            f"holes closed by smooth patches: {len(holes)}, the longest {length * _UNITS[unit]:.2f} m around "
+            f"holes, over which the body model's skin is taken: {len(holes)}, the longest {length * _UNITS[unit]:.2f} m around "
             f"at ({x:.2f}, {y:.2f}, {z:.2f}) m"
         )
     if sits:
         notes.append(
             "the scan sits; its mannequin stands, and warpflat fit --keep-pose carries a garment to it as it sits"
         )
-    upright = Slicer(new, triangles, noise * _UNITS[unit], len(scanned))
+    upright = Slicer(new, triangles, noise * _UNITS[unit])
     upright.sits = sits
     upright.placed = frame.T * _UNITS[unit], new[0] - points[0] @ frame.T * _UNITS[unit]
     return upright, notes
