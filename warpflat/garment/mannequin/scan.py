@@ -1,9 +1,8 @@
-"""The blueprint of a scanned body."""
+"""The mannequin of a scanned body."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,19 +10,21 @@ from numpy.typing import NDArray
 from warpflat.core import FloatArray, arc_lengths
 from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.blueprint import Blueprint, Profile
+from warpflat.garment.mannequin.builder import build_vertices
 from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.layout import RING_LEVELS, Layout
+from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.profiles import convex_girth, scale_to_girth, upper_hull
 from warpflat.garment.mannequin.rays import row_at, smooth_radii
 from warpflat.garment.mannequin.read_body import read_body, whole_sections
 from warpflat.garment.mannequin.scan_limbs import leg_curves, underarm_point, upper_curves
-from warpflat.garment.mannequin.scan_measures import ScanMeasure, body_measures, guess_note, missing_note
+from warpflat.garment.mannequin.scan_measures import body_measures, guess_note, missing_note
 from warpflat.garment.mannequin.scan_pose import ScanOptions
 from warpflat.garment.mannequin.scan_sections import BodySections
 from warpflat.garment.mannequin.slicer import UP
 from warpflat.garment.mannequin.table_body import PRINCESS
 
-__all__ = ["ScanFound", "average_sides", "blueprint_from_scan", "sides_note"]
+__all__ = ["average_sides", "mannequin_on_scan", "sides_note"]
 
 # Harmonics of the sampled hulls that are kept around the body.
 _HARMONICS = 28
@@ -35,42 +36,22 @@ _ARM_LEAN = np.radians(11.0)
 _OFF_PLUMB = 0.5
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ScanFound:
-    """The result of slicing a scan.
-
-    Attributes:
-        blueprint: ready for the grid.
-        source: one line for metrics.
-        notes: findings from the shape, one sentence each.
-        sections: length [m] of the body's own section, hollows followed, at every closed level.
-        measures: tapes around the scan itself, by name.
-        scan: vertices (#P by 3 [m]) upright with the legs moved together, and triangles.
-        placed: a matrix (3 by 3) and a shift [m], by which points of the scan come upright, before the legs move.
-    """
-
-    blueprint: Blueprint
-    source: str
-    notes: tuple[str, ...]
-    sections: Mapping[str, float]
-    measures: Mapping[str, ScanMeasure]
-    scan: tuple[FloatArray, NDArray[np.int64]]
-    placed: tuple[FloatArray, FloatArray]
-
-
-def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions) -> ScanFound:
-    """Fit the body model to a scan, lay it on the scan, and slice it into the curves that the grid is laid on.
+def mannequin_on_scan(
+    vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions, layout: Layout
+) -> Mannequin:
+    """Fit the body model to a scan, lay it on the scan, slice it into the curves of a blueprint, and lay the grid on these.
 
     Args:
         vertices: #V by 3, any unit.
         faces: #F by 3 or 4 (-1 in the last column for a triangle).
         options: what the user knows about the scan.
+        layout: the grid.
 
     Raises:
         InputError: if the mesh is not a body that stands on two legs, or has a measure that no body has.
     """
     read = read_body(vertices, faces, options)
-    body, stands = read.body, read.stands
+    stands, t = read.stands, read.stands.trunk
     levels = {name: level.height for name, level in read.levels.items()}
     with whole_sections():
         underarms = {side: underarm_point(stands, side, levels["underbust"]) for side in ("left", "right")}
@@ -82,12 +63,14 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
             attract=_attractor(stands, levels),
         )  # fmt: skip
         measures = body_measures(read, neck, options.landmarks)
-    t = stands.trunk
+    made = build_vertices(layout, blueprint)
     told = [f"{name} was given: {height:.3f} m" for name, height in options.landmarks.items()]
-    return ScanFound(
-        blueprint=blueprint,
-        source=f"scan of a body {body.stature:.3f} m tall; the body model lies {1000.0 * read.laid.far:.1f} mm off it in the mean",
-        notes=(*read.notes, *told, *guess_note(measures, read.found), *missing_note(measures)),
+    sides = sides_note(made, layout, averaged=options.symmetric)
+    return Mannequin(
+        layout=layout,
+        vertices=average_sides(made, layout) if options.symmetric else made,
+        source=f"scan of a body {read.body.stature:.3f} m tall; the body model lies {1000.0 * read.laid.far:.1f} mm off it in the mean",
+        notes=(*read.notes, *told, *guess_note(measures, read.found), *missing_note(measures), *sides),
         sections={level: float(np.interp(levels[level], t.y, t.length)) for level in RING_LEVELS},
         measures=measures,
         scan=(stands.scan.vertices, read.scan.triangles),
