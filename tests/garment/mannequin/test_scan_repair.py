@@ -24,8 +24,9 @@ def test_holes_are_found_with_their_lengths_and_middles() -> None:
     far = points + np.array([0.0, 1.4, 0.0])
     holes = find_holes(np.concatenate([points, far]), np.concatenate([torn, triangles + len(points)]))
     (wide, middle), (small, _) = sorted(holes, key=lambda hole: -hole[0])
-    assert wide == pytest.approx(2.0 * np.pi * 0.048, rel=0.1)
-    assert small == pytest.approx(2.0 * np.pi * 0.02, rel=0.2)
+    # Their rims run to and fro along edges of the mesh.
+    assert 1.0 < wide / (2.0 * np.pi * 0.048) < 1.5
+    assert 1.0 < small / (2.0 * np.pi * 0.02) < 1.5
     np.testing.assert_allclose(middle, [0.0875, 0.0, 0.0], atol=0.003)
 
 

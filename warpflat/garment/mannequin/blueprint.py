@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -86,7 +86,8 @@ class ArmCurves:
 
 def mirrored(curves: _Curves) -> _Curves:
     """Return the curves of the other side of a symmetric body."""
-    flipped = {name: line * [-1.0, 1.0, 1.0] for name, line in vars(curves).items() if isinstance(line, np.ndarray)}
+    lines = {name: line for name, line in vars(curves).items() if isinstance(line, np.ndarray)}
+    flipped: dict[str, Any] = {name: line * [-1.0, 1.0, 1.0] for name, line in lines.items()}
     return replace(curves, **flipped)
 
 

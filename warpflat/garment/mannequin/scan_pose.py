@@ -129,19 +129,19 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
         )
     up = _AXES[up_name]
     height = float(np.ptp(points @ up))
-    could_be = (unit for unit, factor in _UNITS.items() if _STATURE[0] <= height * factor <= _STATURE[1])
-    unit = options.unit or next(could_be, None)
-    if unit is None:
+    could_be = (name for name, factor in _UNITS.items() if _STATURE[0] <= height * factor <= _STATURE[1])
+    unit_name = options.unit or next(could_be, None)
+    if unit_name is None:
         raise InputError(
             f"scan: {height:.4g} tall in its own unit, which is a body's height in none of {', '.join(_UNITS)}; scale it"
         )
-    size = height * _UNITS[unit]
+    size = height * _UNITS[unit_name]
     if not _STATURE[0] <= size <= _STATURE[1]:
         raise InputError(
-            f"scan: {size:.3g} m tall if its unit is {unit}: a body is {_STATURE[0]} to {_STATURE[1]} m tall"
+            f"scan: {size:.3g} m tall if its unit is {unit_name}: a body is {_STATURE[0]} to {_STATURE[1]} m tall"
         )
-    if options.unit is None and unit != "m":
-        notes.append(f"the scan's unit was found from its height of {height:.4g}: {unit}")
+    if options.unit is None and unit_name != "m":
+        notes.append(f"the scan's unit was found from its height of {height:.4g}: {unit_name}")
     if up_name != "+y":
         notes.append(f"the scan's head was found towards {up_name}")
     left = unit(sideways) if sits else across_trunk(slicer, up, sideways)
@@ -156,26 +156,26 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
     frame = np.array([left * turn, up, ahead * turn])
     if options.facing is None and frame[2, 2] < 0.9:
         notes.append(f"the scan was found to face ({frame[2, 0]:+.2f}, {frame[2, 1]:+.2f}, {frame[2, 2]:+.2f})")
-    new = points @ frame.T * _UNITS[unit]
+    new = points @ frame.T * _UNITS[unit_name]
     new[:, 1] -= new[:, 1].min()
     trunk = Slicer(new, triangles).cut(UP, 0.55 * size)
     new[:, 0] -= 0.5 * (trunk[0].points[:, 0].min() + trunk[0].points[:, 0].max())
     if noise:
-        notes.append(f"the scan is noisy by {1000.0 * noise * _UNITS[unit]:.1f} mm; it was smoothed")
+        notes.append(f"the scan is noisy by {1000.0 * noise * _UNITS[unit_name]:.1f} mm; it was smoothed")
     if holes:
         length, place = max(holes, key=lambda hole: hole[0])
-        x, y, z = place @ frame.T * _UNITS[unit] + (new[0] - points[0] @ frame.T * _UNITS[unit])
+        x, y, z = place @ frame.T * _UNITS[unit_name] + (new[0] - points[0] @ frame.T * _UNITS[unit_name])
         notes.append(
-            f"holes, over which the body model's skin is taken: {len(holes)}, the longest {length * _UNITS[unit]:.2f} m around "
+            f"holes, over which the body model's skin is taken: {len(holes)}, the longest {length * _UNITS[unit_name]:.2f} m around "
             f"at ({x:.2f}, {y:.2f}, {z:.2f}) m"
         )
     if sits:
         notes.append(
             "the scan sits; its mannequin stands, and warpflat fit --keep-pose carries a garment to it as it sits"
         )
-    upright = Slicer(new, triangles, noise * _UNITS[unit])
+    upright = Slicer(new, triangles, noise * _UNITS[unit_name])
     upright.sits = sits
-    upright.placed = frame.T * _UNITS[unit], new[0] - points[0] @ frame.T * _UNITS[unit]
+    upright.placed = frame.T * _UNITS[unit_name], new[0] - points[0] @ frame.T * _UNITS[unit_name]
     return upright, notes
 
 
