@@ -19,6 +19,8 @@ from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
 __all__ = [
     "ON",
     "ON_EDGE",
+    "SAME_LINE",
+    "SHORT",
     "Place",
     "added",
     "backwards",
@@ -58,8 +60,10 @@ Sides = SeamSide | tuple[SeamSide, ...]
 
 #: What lies on a line or an outline does so within this distance [m]; a line of a piece ends on an edge within the second.
 ON, ON_EDGE = 1e-6, 1e-3
-# A line that is shorter inside an outline is left out [m].
-_SHORT = 1e-3
+#: A line or a stretch that is shorter is left out [m].
+SHORT = 1e-3
+#: Lines that differ by no more [m] are one.
+SAME_LINE = 5e-5
 
 
 def direction(points: FloatArray) -> FloatArray:
@@ -88,7 +92,7 @@ def lines_inside(lines: Mapping[str, FloatArray], outline: FloatArray) -> dict[s
     body, found = shapely.Polygon(outline).buffer(ON), {}
     for name, line in lines.items():
         parts = shapely.get_parts(shapely.LineString(line).intersection(body))
-        parts = [part for part in parts if part.geom_type == "LineString" and part.length > _SHORT]
+        parts = [part for part in parts if part.geom_type == "LineString" and part.length > SHORT]
         if parts:
             found[name] = np.asarray(max(parts, key=lambda part: part.length).coords)
     return found

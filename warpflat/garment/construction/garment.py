@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from warpflat.garment.construction.wearer import WearerFit
     from warpflat.pattern import Body, DraftedOutline
 
-__all__ = ["Garment"]
+__all__ = ["SAME_PIECE", "Garment"]
 
-# Largest distance [m] of a piece from the mirror image of its partner at which one pattern serves for both.
-_SAME_PIECE = 5e-4
+#: What differs by less than this [m] from the mirror image of its partner is cut by one pattern.
+SAME_PIECE = 5e-4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -129,7 +129,7 @@ class Garment:
             second, partners = self.images.get(first, (first, None))
             if names.index(second) > names.index(first):
                 a, b = self.pieces[first].positions * [-1.0, 1.0], self.pieces[second].positions[partners]
-                if np.abs((a - a.mean(axis=0)) - (b - b.mean(axis=0))).max() < _SAME_PIECE:
+                if np.abs((a - a.mean(axis=0)) - (b - b.mean(axis=0))).max() < SAME_PIECE:
                     found.append((first, second))
         return tuple(found)
 

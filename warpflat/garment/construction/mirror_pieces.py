@@ -10,6 +10,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, arc_lengths
 from warpflat.flat import mirror_plane
+from warpflat.garment.construction.edges import SAME_LINE
 from warpflat.pattern import Pattern, Piece, Seam, SeamSide
 
 if TYPE_CHECKING:
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = ["draw_pairs_once"]
 
-#: Edges of a pair that is cut by one pattern agree in length, up to each of their points, within this [m].
-SAME_LENGTH = 5e-5
 # A plane of symmetry whose normal has this cosine to x at least is that between left and right.
 _UPRIGHT = 0.8
 
@@ -139,7 +138,7 @@ def _matching_edges(garment: Garment, pieces: Sequence[Piece], first: str, secon
         image = next((e for e in two.edges if e.vertices is not None and np.array_equal(e.vertices, row)), None)
         if image is None or (image.kind, image.width) != (edge.kind, edge.width):
             return None
-        if np.abs(arc_lengths(image.points[::-1]) - arc_lengths(edge.points)).max() > SAME_LENGTH:
+        if np.abs(arc_lengths(image.points[::-1]) - arc_lengths(edge.points)).max() > SAME_LINE:
             return None
         edges[image.name] = edge.name
     return edges if len(edges) == len(two.edges) else None

@@ -41,7 +41,7 @@ from warpflat.garment.construction.closed_cuts import CLOSED, are_closed, close_
 from warpflat.garment.construction.darts import pleat_depths
 from warpflat.garment.construction.ease import measure_ease
 from warpflat.garment.construction.edge_rules import EdgeRules
-from warpflat.garment.construction.edges import Place, lengths_of, with_pieces
+from warpflat.garment.construction.edges import SHORT, Place, lengths_of, with_pieces
 from warpflat.garment.construction.equal_pieces import draw_equal_pieces_once
 from warpflat.garment.construction.facings import STAND, Stand
 from warpflat.garment.construction.finishing import finish_edges, hem_rises
@@ -94,8 +94,8 @@ _DECIMALS = 6
 GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
 #: A piece hangs this far [m] in front of its surface, if its border spans the plane by this share at least.
 BESIDE, ALIGNED = 0.05, 1e-3
-#: How a note on a seam of a mesh begins that its pattern lacks; shorter stretches [m] are not told.
-LACKING, _LACKING = "not sewn in the pattern:", 1e-3
+#: How a note on a seam of a mesh begins that its pattern lacks.
+LACKING = "not sewn in the pattern:"
 # How a note on a pattern begins that does not show how it is worn.
 _NO_DRAWING = "the guide has no line drawing of the garment"
 # What lines along a border are called that nobody has named, with the numbers of their stretches.
@@ -760,7 +760,7 @@ def _lacking_seams(garment: Garment, pattern: Pattern) -> list[tuple[Stitching, 
         lost = [None not in (one, other) and (one != other or one == -1) for one, other in zip(*numbers, strict=True)]
         length = np.linalg.norm(np.diff(layouts[0][pair.vertices[0]], axis=0), axis=1)
         for run in np.split(np.arange(len(lost)), np.flatnonzero(np.diff(lost)) + 1):
-            if lost[run[0]] and length[run].sum() > _LACKING:
+            if lost[run[0]] and length[run].sum() > SHORT:
                 found.append((pair, run.astype(np.int32)))
     return found
 

@@ -20,14 +20,14 @@ from warpflat.garment.mannequin.body_landmarks import PLACES, height_weights
 from warpflat.garment.mannequin.body_model import BodyModel, Person, rotation
 from warpflat.garment.mannequin.closest import Mesh
 
-__all__ = ["ALIKE", "FEW", "SAMPLES", "FittedBody", "fit_body", "step_within"]
+__all__ = ["FEW", "SAMPLES", "FittedBody", "fit_body", "step_within"]
 
 #: Points on a scan or cloth that draw the body to themselves.
 SAMPLES = 2_500
 #: Vertices of the body that are drawn while starts are compared.
 FEW = 900
-#: Surfaces face the same way where their normals' product is larger than this.
-ALIKE = 0.35
+# Surfaces face the same way where their normals' product is larger than this.
+_ALIKE = 0.35
 # How much the scan's samples count against the body's vertices.
 _FROM_SCAN = 0.7
 # A step bends no joint by more than this [rad].
@@ -122,7 +122,7 @@ def fit_body(
             person, cost = _step(fine, normals[plain], scan, known, person, preference, reach, shapes=True, sits=sits)
     posed = model.vertices(person)
     found, weights, place = mesh.closest(posed)
-    alike = np.einsum("va,va->v", vertex_normals(posed, model.triangles), mesh.normals_at(found, weights)) > ALIKE
+    alike = np.einsum("va,va->v", vertex_normals(posed, model.triangles), mesh.normals_at(found, weights)) > _ALIKE
     distance = np.where(alike, np.linalg.norm(posed - place, axis=1), np.inf)
     return FittedBody(person=person, distance=distance, cost=cost)
 
@@ -177,7 +177,7 @@ def _step(
     hit = np.concatenate([np.arange(model.count), near])
     directions = np.concatenate([scan.mesh.normals[found], scan.normals])
     away = posed[hit] - np.concatenate([place, scan.points])
-    alike = np.einsum("pa,pa->p", turned[hit], directions) > ALIKE
+    alike = np.einsum("pa,pa->p", turned[hit], directions) > _ALIKE
     squared = np.einsum("pa,pa->p", away, away) / reach**2
     weight = np.where(alike, 1.0 / (1.0 + squared) ** 2, 0.0)
     weight *= np.repeat([_VERTICES / model.count, _FROM_SCAN], [model.count, len(near)])
@@ -202,7 +202,7 @@ def _step(
         if sits and name.startswith(("upperleg", "lowerleg")):
             bends[joint] = 0.0
     stiffness[count : count + 3 * joints] = bends.ravel()
-    step = step_within(model, person, matrix, gradient, stiffness, shapes=shapes)
+    step = step_within(model, person, matrix, gradient, stiffness, shapes=shapes, most_bend=_MOST_BEND)
     body = slice(0, model.count)
     mean = float(np.sqrt((weight[body] * residual[body] ** 2).sum() / max(weight[body].sum(), 1e-9)))
     return model.moved(person, step), mean + 0.02 * float(1.0 - alike[body].mean())
@@ -216,6 +216,7 @@ def step_within(
     stiffness: FloatArray,
     *,
     shapes: bool,
+    most_bend: float,
 ) -> FloatArray:
     """Return the Gauss-Newton step of a person's parameters that draws departures from the mean back, and bends no joint too far.
 
@@ -225,6 +226,7 @@ def step_within(
         matrix, gradient: of the sum of squares.
         stiffness: how much each parameter is drawn back, by how far it departs.
         shapes: whether shapes may change.
+        most_bend: of any joint [rad].
     """
     count, bends = len(model.shapes), slice(len(model.shapes), len(model.shapes) + 3 * len(model.parents))
     departures = np.zeros(len(gradient))
@@ -233,4 +235,4 @@ def step_within(
     free = slice(0 if shapes else count, None)
     step = np.zeros(len(gradient))
     step[free] = np.linalg.solve(whole[free, free], -(gradient + stiffness * departures)[free])
-    return np.asarray(step * min(1.0, _MOST_BEND / max(float(np.abs(step[bends]).max()), 1e-9)))
+    return np.asarray(step * min(1.0, most_bend / max(float(np.abs(step[bends]).max()), 1e-9)))

@@ -13,7 +13,7 @@ from warpflat.core import FloatArray
 from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.body_model import BodyModel, Person, rotation
 from warpflat.garment.mannequin.closest import Mesh
-from warpflat.garment.mannequin.fit_body import ALIKE, FEW, SAMPLES, FittedBody, step_within
+from warpflat.garment.mannequin.fit_body import FEW, SAMPLES, FittedBody, step_within
 
 __all__ = ["fit_inside"]
 
@@ -21,6 +21,8 @@ __all__ = ["fit_inside"]
 _FEW_SAMPLES, _VERTICES = 600, 2_600
 # The stature that is preferred, and the gap under plain cloth [m].
 _STATURE, _GAP = 1.68, 0.006
+# Cloth and skin face the same way where their normals' product is larger than this.
+_ALIKE = 0.3
 # What cloth counts within the skin, and far off it [m].
 _WITHIN, _OFF, _FAR = 4.0, 0.25, 0.02
 # Bends of the arms from which it starts [rad], and heights of the garment's top [share of the stature], step by step.
@@ -28,8 +30,8 @@ _ARMS, _TOPS, _TOP_STEP = (0.0, 0.45, -0.45, 0.8, -0.8), (0.45, 0.93), 0.055
 # Stages: steps, weight of the preferences, distance at which a place counts a quarter [m], whether shapes may change.
 _FIRST, _NEXT, _LAST = (3, 2.0, 0.15, False), ((4, 1.0, 0.1, False), (4, 0.3, 0.1, True)), (6, 0.2, 0.06, True)
 _GO_ON = 4
-# A step moves the body by no more [m].
-_MOST_MOVE = 0.05
+# A step bends no joint by more [rad], and moves the body by no more [m].
+_MOST_BEND, _MOST_MOVE = 0.3, 0.05
 # How much the joints are held: all, and more of some.
 _HELD = {"spine03": 2.0, "clavicle": 1.0, "lowerleg01": 1.0, "upperleg01": 1.0, "neck01": 1.0, "foot": 1.0}
 
@@ -106,7 +108,7 @@ def _step(
     facing = turned[near]
     gap = np.einsum("pa,pa->p", points - posed[near], facing)
     residual = gap - _GAP
-    weight = np.where(np.einsum("pa,pa->p", facing, normals) > ALIKE, 1.0 / (1.0 + (far / reach) ** 2) ** 2, 0.0)
+    weight = np.where(np.einsum("pa,pa->p", facing, normals) > _ALIKE, 1.0 / (1.0 + (far / reach) ** 2) ** 2, 0.0)
     weight *= np.where(residual > 0.0, np.where(residual > _FAR, _OFF, 1.0), _WITHIN)
     rows = -np.einsum("pak,pa->pk", jacobian[near], facing)
     matrix, gradient = (rows * weight[:, None]).T @ rows, rows.T @ (weight * residual)
@@ -117,7 +119,7 @@ def _step(
     stiffness[count : count + 3 * joints] = np.repeat(held, 3)
     stiffness[-1] = 30.0 * preference
     gradient[-1] += stiffness[-1] * np.log(person.scale / _STATURE)
-    step = step_within(model, person, matrix, gradient, stiffness, shapes=shapes)
+    step = step_within(model, person, matrix, gradient, stiffness, shapes=shapes, most_bend=_MOST_BEND)
     step *= min(1.0, _MOST_MOVE / max(float(np.abs(step[-4:-1]).max()), 1e-9))
     mean = float(np.sqrt((weight * residual**2).sum() / max(weight.sum(), 1e-9)))
     return model.moved(person, step), mean + 0.05 * float(1.0 - np.minimum(weight, 1.0).mean())
