@@ -51,7 +51,7 @@ def cracked(shape: str, size: int) -> Mesh:
     side = round(len(whole.vertices) ** 0.5)
     index = np.arange(side * side, dtype=np.int32).reshape(side, side)
     column = index[: round(0.6 * side), round(side / 3)]
-    made = cut_along(whole.faces, column, vertex_count=len(whole.vertices))
+    made = cut_along(whole.faces, [column], vertex_count=len(whole.vertices))
     centre = whole.lines["centre"]
     surface = make_surface(
         whole.vertices[made.vertex_origin], made.faces, lines={"centre": centre}, name=f"{shape}_cracked"

@@ -43,11 +43,11 @@ from warpflat.flat.solver.steps import Relaxation
 from warpflat.flat.surface.half_edges import half_edges_of
 from warpflat.flat.surface.injective import overlap_area
 from warpflat.flat.surface.io.read import read_surface
-from warpflat.flat.surface.io.sewn_panels import read_sewn_panels
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.flat.surface.shapes import bodice
 from warpflat.flat.surface.triangles import triangulate
+from warpflat.garment.construction.sewn_panels import read_sewn_panels
 from warpflat.garment.mannequin.mannequin import Mannequin
 
 _NEAR_ENERGY, _NEAR_OUTLINE = 1e-3, 1e-4

@@ -22,9 +22,9 @@ import numpy as np
 
 import warpflat
 from warpflat.core.polyline import polyline_length
-from warpflat.flat.flattening.graded import graded_layout
 from warpflat.flat.surface.triangles import triangulate
 from warpflat.garment.construction.carry import carry
+from warpflat.garment.construction.graded import graded_layout
 from warpflat.garment.construction.level_ease import level_ease, widened
 from warpflat.garment.mannequin.common_body import common_body_of_mannequin, skin_triangles
 from warpflat.garment.mannequin.mannequin import Mannequin

@@ -25,15 +25,15 @@ from numpy.typing import NDArray
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
-from warpflat.flat.flattening.as_cut import distances_laid
 from warpflat.flat.flattening.flatten_all import flatten_all
 from warpflat.flat.flattening.result import Flattening
 from warpflat.flat.surface.connectivity import border_loops
 from warpflat.flat.surface.io.read import read_mesh_file
-from warpflat.flat.surface.io.sewn_panels import SewnPanel, mesh_area, sewn_panels
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.triangles import triangulate
+from warpflat.garment.construction.laid_as_cut import distances_laid
 from warpflat.garment.construction.sew_pieces import Bands, sew_pieces
+from warpflat.garment.construction.sewn_panels import SewnPanel, mesh_area, sewn_panels
 
 FloatArray = NDArray[np.float64]
 

@@ -22,10 +22,10 @@ from pydantic import BaseModel, create_model
 from pydantic.fields import FieldInfo
 
 import warpflat
+from warpflat.app.scene.first_shapes import PIECES
 from warpflat.app.scene.schema import SceneTable
 from warpflat.core.toml_file import Table, read_toml
 from warpflat.flat.solver.options import RelaxOptions
-from warpflat.flat.surface.first_shapes import PIECES
 from warpflat.flat.surface.shapes import SHAPES
 from warpflat.garment.mannequin.blend import Adjustment
 from warpflat.garment.mannequin.ease import EASE_PRESETS
@@ -44,13 +44,12 @@ HEADINGS = {
     "BorderTable": "`border` of a line",
     "MannequinTable": "`[mannequin]`",
     "CutTable": "`[[cuts]]`",
-    "CutPlane": "`plane` of a cut",
+    "CutPlane": "`plane` of a cut or a seam",
     "AutoCutTable": "`[auto_cut]`",
     "PieceTable": "`[pieces.NAME]`",
     "SeamTable": "`[[seams]]`",
     "FindSeamsTable": "`[seams]`",
     "SeamCutTable": "`[[seams_cut]]`",
-    "SeamCutPlane": "`plane` of a seam",
     "ConstraintTable": "`[[constraints]]`",
     "WearTable": "`[wear]`",
     "DrapeTable": "`[drape]`",

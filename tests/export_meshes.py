@@ -22,8 +22,6 @@ def surface(vertices: NDArray[np.float64], faces: NDArray[np.int32], name: str =
         faces=faces,
         lines=named,
         name=name,
-        input_vertices=vertices,
-        input_index=np.arange(len(vertices), dtype=np.int32),
     )
 
 

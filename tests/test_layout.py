@@ -43,7 +43,7 @@ ROOMS = {
     "flattening": "core surface fabric model solver kernels",
     "cutting": "core surface model solver flattening",
     "mannequin": "core surface drafting export kernels",
-    "construction": "core surface fabric model solver drafting export flattening cutting mannequin",
+    "construction": "core surface fabric model solver drafting export flattening cutting mannequin kernels",
     "draping": "core surface fabric model solver drafting export flattening mannequin construction kernels",
     "seams": "core surface fabric model solver drafting flattening cutting construction",
     "review": "core surface export",

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from warpflat.core.environment import require_environment
+from warpflat.app.cli.environment import require_environment
 from warpflat.core.errors import CannotWriteError, InputError, StepError
 from warpflat.core.left_out import LeftOut, listening_to_left_out
 from warpflat.core.output import (

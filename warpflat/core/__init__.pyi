@@ -12,7 +12,6 @@ from .beside import work_beside as work_beside
 from .compile import compile_all_modules as compile_all_modules
 from .compile import launch_quietly as launch_quietly
 from .compile import start_warp as start_warp
-from .environment import require_environment as require_environment
 from .errors import SIGNALS as SIGNALS
 from .errors import CannotWriteError as CannotWriteError
 from .errors import InputError as InputError
@@ -32,6 +31,7 @@ from .file_names import make_piece_name as make_piece_name
 from .file_names import plain_label as plain_label
 from .file_names import plain_name as plain_name
 from .file_names import same_file as same_file
+from .file_names import with_plain_letters as with_plain_letters
 from .input_files import FARTHEST as FARTHEST
 from .input_files import Place as Place
 from .input_files import check_values as check_values
@@ -88,6 +88,7 @@ from .sums import range_offsets as range_offsets
 from .sums import weighted_percentile as weighted_percentile
 from .sums import weighted_percentiles as weighted_percentiles
 from .text import MADE_TO_MEASURE as MADE_TO_MEASURE
+from .text import aligned as aligned
 from .text import area_words as area_words
 from .text import control_in as control_in
 from .text import energy_words as energy_words
@@ -104,10 +105,7 @@ from .text import without_side as without_side
 from .threads import thread_count as thread_count
 from .toml_file import Table as Table
 from .toml_file import check_table as check_table
-from .toml_file import document_as_toml as document_as_toml
-from .toml_file import laid_over as laid_over
 from .toml_file import read_toml as read_toml
-from .toml_file import tables_as_toml as tables_as_toml
 from .usd_layers import check_layers as check_layers
 from .usd_process import UNREADABLE as UNREADABLE
 from .usd_process import read_apart as read_apart

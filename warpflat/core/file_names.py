@@ -16,6 +16,7 @@ __all__ = [
     "plain_label",
     "plain_name",
     "same_file",
+    "with_plain_letters",
 ]
 
 # Hidden beginnings, separators and drives lead elsewhere; the others Windows refuses.
@@ -58,16 +59,21 @@ def plain_label(label: str) -> str:
     return "".join("_" if control_in(letter) else letter for letter in label)
 
 
-def make_file_name(name: str, otherwise: str = "piece") -> str:
+def make_file_name(name: str) -> str:
     """Return a name that was not chosen for a file, such as that of a node in a scene, changed so that a file can have it."""
     plain = "".join("_" if _is_forbidden(letter) else letter for letter in name).strip().lstrip(".")
     short = plain.encode()[:_MOST_BYTES].decode(errors="ignore")
-    return f"_{short}" if _is_device(short) else short or otherwise
+    return f"_{short}" if _is_device(short) else short or "piece"
 
 
 def make_piece_name(name: str) -> str:
     """Return a piece's name made of one that was not chosen for it, such as that of a material: an edge of it is "piece.edge"."""
     return make_file_name(name).replace(".", "_")
+
+
+def with_plain_letters(name: str, others: str = "_.-") -> str:
+    """Return a name of plain letters that is like another one: "Ärmel (1)" becomes "Armel_1"; it may be empty."""
+    return re.sub(rf"[^A-Za-z0-9{re.escape(others)}]+", "_", plain_letters(name)).strip(others)
 
 
 def plain_name(name: str, others: str = " _.-") -> str:
@@ -78,7 +84,7 @@ def plain_name(name: str, others: str = " _.-") -> str:
     """
     if re.fullmatch(rf"[A-Za-z0-9][A-Za-z0-9{re.escape(others)}]*", name):
         return name
-    better = re.sub(rf"[^A-Za-z0-9{re.escape(others)}]+", "_", plain_letters(name)).strip(others)
+    better = with_plain_letters(name, others)
     hint = f"; {quote_value(better)} would do" if better else ""
     raise ValueError(
         f"{quote_value(name)} cannot name files: it must begin with one of a to z, A to Z, 0 to 9, and may have besides them only "

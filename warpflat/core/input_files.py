@@ -76,7 +76,6 @@ FORMATS: Mapping[str, FileFormat] = {
     "piece": FileFormat("a piece of a run", 500 * _MEGABYTE, "run the scene again"),
     "picture": FileFormat("a picture of a run", 200 * _MEGABYTE, "run the scene again"),
     "film": FileFormat("the film of a run", 4000 * _MEGABYTE, "run the scene again"),
-    "start": FileFormat("a start", 500 * _MEGABYTE, "give an OBJ file with texture coordinates"),
     "named": FileFormat("a file that a scene names", 4000 * _MEGABYTE, "give a regular file"),
     "report": FileFormat("JSON", 200 * _MEGABYTE, "run the scene again", links=False),
     "output": FileFormat("a file of a run", 4000 * _MEGABYTE, "run the scene again", links=False),

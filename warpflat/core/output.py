@@ -80,8 +80,8 @@ _NEW, _ASIDE, _FRESH = "new", "aside", "fresh.json"
 _OPEN_ELSEWHERE = 5, 32
 # Virus scanners and indexers open new files for moments: waits between attempts [s].
 _WAITS = 0.02, 0.05, 0.1, 0.2, 0.4, 0.8
-# The reports that list files, of a run, a comparison, a ledger of cuts, an edited dart, and a batch.
-_REPORTS = "metrics.json", "compare.json", "ledger.json", "edit.json", "batch.json"
+# The reports that list files, of a run, a comparison, a ledger of cuts, an edited dart, a batch, and a study of bodies.
+_REPORTS = "metrics.json", "compare.json", "ledger.json", "edit.json", "batch.json", "fit.json"
 # Equal runs have equal seals: what they took is not part of it.
 _TIMES = "seconds", "memory_mb"
 # Files that bear no name: in a folder with several runs they are taken to be the last one's.

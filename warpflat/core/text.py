@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Container
+from collections.abc import Container, Sequence
 
 __all__ = [
     "MADE_TO_MEASURE",
+    "aligned",
     "control_in",
     "find_unused_name",
     "format_count",
@@ -83,6 +84,19 @@ def _is_control(letter: str) -> bool:
     if "\u202a" <= letter <= "\u202e" or "\u2066" <= letter <= "\u2069" or ord(letter) & 0xFFFE == 0xFFFE:
         return True
     return unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp")
+
+
+def aligned(head: Sequence[str], rows: Sequence[Sequence[str]], *, left: Sequence[int] = (0,)) -> str:
+    """Return rows in columns under their heads, aligned to the right but for the columns listed in `left`."""
+    table = [head, *rows]
+    widths = [max(len(row[column]) for row in table) for column in range(len(head))]
+    return "\n".join(
+        "  ".join(
+            cell.ljust(width) if column in left else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in table
+    )
 
 
 def energy_words(joules: float, digits: int = 3) -> str:

@@ -1,12 +1,10 @@
-"""TOML files are read and checked against a pydantic model; a mistake becomes one line. Plain tables are written as TOML."""
+"""TOML files are read and checked against a pydantic model; a mistake becomes one line."""
 
 from __future__ import annotations
 
-import json
-import re
 import sys
 import types
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
@@ -23,7 +21,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["Table", "check_table", "document_as_toml", "laid_over", "read_toml", "tables_as_toml"]
+__all__ = ["Table", "check_table", "read_toml"]
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -32,6 +30,14 @@ class Table(BaseModel):
     """A frozen table of a file, without unknown keys, "1" for 1, or NaN."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+    def given(self) -> dict[str, Any]:
+        """Return what the file says, by its own keys; without what holds by default."""
+        return self.model_dump(exclude_unset=True, by_alias=True)
+
+    def metres(self, *keys: str) -> dict[str, Any]:
+        """Return lengths [m] by name: "width" of the field `width_mm`."""
+        return {key: 1e-3 * getattr(self, f"{key}_mm") for key in keys}
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -137,76 +143,3 @@ def _members(annotation: Any) -> Iterator[Any]:
 def _fields(model: type[BaseModel]) -> dict[str, Any]:
     """Annotations by the keys that a file has for them."""
     return {field.alias or name: field.annotation for name, field in model.model_fields.items()}
-
-
-def tables_as_toml(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
-    """Return arrays of plain tables, as `cuts` and `seams`, as TOML to be pasted into a scene."""
-    return "\n".join(
-        f"[[{name}]]\n" + "".join(f"{key} = {_toml(value)}\n" for key, value in table.items())
-        for name, rows in tables.items()
-        for table in rows
-    )
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        return f'"{escaped}"'
-    if isinstance(value, Sequence):
-        return f"[{', '.join(_toml(each) for each in value)}]"
-    return f"{value:.6g}"
-
-
-def document_as_toml(tables: Mapping[str, Any]) -> str:
-    """Return nested tables as a TOML file, every number with all its digits."""
-    return "\n".join(_document_lines(tables, ())) + "\n"
-
-
-def _document_lines(table: Mapping[str, Any], place: tuple[str, ...]) -> Iterator[str]:
-    """Yield the lines of a table: its plain values, its tables, its arrays of tables."""
-    below: list[tuple[str, Any]] = []
-    for key, value in table.items():
-        if isinstance(value, Mapping) or (
-            value and isinstance(value, list) and all(isinstance(each, Mapping) for each in value)
-        ):
-            below.append((key, value))
-        else:
-            yield f"{_key(key)} = {_exact(value)}"
-    for key, value in below:
-        inner = (*place, key)
-        name = ".".join(map(_key, inner))
-        for head, one in [(f"[{name}]", value)] if isinstance(value, Mapping) else [(f"[[{name}]]", v) for v in value]:
-            yield ""
-            yield head
-            yield from _document_lines(one, inner)
-
-
-def _key(key: str) -> str:
-    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else json.dumps(key, ensure_ascii=False)
-
-
-def _exact(value: Any) -> str:
-    """Return a value on one line; JSON's texts are TOML's, too."""
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return f"[{', '.join(map(_exact, value))}]"
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str | bool) else repr(value)
-
-
-def laid_over(base: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a table with another one laid over it: tables are merged, lists of tables put together, other values replaced."""
-    found = dict(base)
-    for key, value in other.items():
-        own = found.get(key)
-        if isinstance(own, Mapping) and isinstance(value, Mapping):
-            found[key] = laid_over(own, value)
-        elif (
-            isinstance(own, list)
-            and isinstance(value, list)
-            and all(isinstance(each, Mapping) for each in (*own, *value))
-        ):
-            found[key] = [*own, *value]
-        else:
-            found[key] = value
-    return found

@@ -2,6 +2,8 @@
 
 from .construction.as_cut import garment_as_cut as garment_as_cut
 from .construction.as_cut import read_cut_pattern as read_cut_pattern
+from .construction.border_seams import BorderSeam as BorderSeam
+from .construction.border_seams import surface_seams as surface_seams
 from .construction.carry import carry as carry
 from .construction.collars import COLLARS as COLLARS
 from .construction.collars import Collar as Collar
@@ -18,6 +20,11 @@ from .construction.ease import SeamWish as SeamWish
 from .construction.ease import cap_wishes as cap_wishes
 from .construction.ease import seam_ratios as seam_ratios
 from .construction.edge_rules import EdgeRules as EdgeRules
+from .construction.file_seams import FILE_SEAMS as FILE_SEAMS
+from .construction.file_seams import MOST_ISLANDS as MOST_ISLANDS
+from .construction.file_seams import FileSeams as FileSeams
+from .construction.file_seams import file_seams as file_seams
+from .construction.file_seams import like_cut_pieces as like_cut_pieces
 from .construction.finishing import FINISHES as FINISHES
 from .construction.finishing import Finishing as Finishing
 from .construction.finishing import with_plackets as with_plackets
@@ -28,6 +35,8 @@ from .construction.form_plan import find_fold_lines as find_fold_lines
 from .construction.form_plan import plan_form as plan_form
 from .construction.garment import Garment as Garment
 from .construction.girths import pattern_girths as pattern_girths
+from .construction.graded import graded_layout as graded_layout
+from .construction.graded import stretches_worn as stretches_worn
 from .construction.level_ease import EASE_LEVELS as EASE_LEVELS
 from .construction.level_ease import level_ease as level_ease
 from .construction.level_ease import widened as widened
@@ -53,6 +62,10 @@ from .construction.sew_pieces import name_seams as name_seams
 from .construction.sew_pieces import sew_pieces as sew_pieces
 from .construction.sew_pieces import unsewn_notes as unsewn_notes
 from .construction.sewing import sew as sew
+from .construction.sewn_panels import SewnPanel as SewnPanel
+from .construction.sewn_panels import read_sewn_panels as read_sewn_panels
+from .construction.sewn_panels import sewn_panels as sewn_panels
+from .construction.sewn_panels import with_cuts as with_cuts
 from .construction.to_pattern import LACKING as LACKING
 from .construction.to_pattern import check_edge_names as check_edge_names
 from .construction.to_pattern import pattern_of_garment as pattern_of_garment

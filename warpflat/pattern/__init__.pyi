@@ -56,6 +56,7 @@ from .drafting.worn import Worn as Worn
 from .export.colours import DRAFTED_CLOTH as DRAFTED_CLOTH
 from .export.colours import ENERGY as ENERGY
 from .export.colours import LEAST_GAP as LEAST_GAP
+from .export.colours import LEAST_PRESSURE as LEAST_PRESSURE
 from .export.colours import SKIN as SKIN
 from .export.colours import SMALLEST_SCALE as SMALLEST_SCALE
 from .export.colours import Scale as Scale
@@ -132,3 +133,8 @@ from .export.views import make_facets as make_facets
 from .export.views import pattern_view as pattern_view
 from .export.views import view_from_side as view_from_side
 from .export.walked_picture import write_walked_picture as write_walked_picture
+from .export.wear_words import RANGES as RANGES
+from .export.wear_words import STRAINS as STRAINS
+from .export.wear_words import limit_words as limit_words
+from .export.wear_words import pressure_words as pressure_words
+from .export.wear_words import strain_words as strain_words

@@ -21,8 +21,11 @@ from command import Command, Ended
 from warpflat._version import __version__
 from warpflat.app.cli.progress_bar import ProgressBar
 from warpflat.app.cli.tables import warnings_of
+from warpflat.app.scene import schema
+from warpflat.app.scene.options import SCENE_OPTIONS
 from warpflat.core.text import energy_words, format_count
 from warpflat.core.toml_file import read_toml
+from warpflat.flat.solver.options import RelaxOptions
 
 SCENES = Path(__file__).parents[3] / "scenes"
 PATTERN_FILES = ("cloth.dxf", "cloth.svg", "pattern.pdf", "pattern.json")
@@ -454,6 +457,22 @@ def test_help_says_what_is_printed_and_where_files_go(command: Command, name: st
     told = " ".join(command(name, "--help")[1].split())
     assert f"--json Print {printed} on standard output" in told
     assert f"Folder for the files. [default: {folder}]" in told
+
+
+@pytest.mark.parametrize("key", SCENE_OPTIONS)
+def test_an_option_of_a_scene_takes_what_its_key_takes(key: str):
+    *table, last = key.split(".")
+    tables = {
+        "surface": schema.FileSurface, "find_seams": schema.FindSeamsTable, "wear": schema.WearTable,
+        "relax": schema.RelaxTable, "output": schema.OutputTable,
+    }  # fmt: skip
+    field, option = (tables[table[0]] if table else schema.SceneTable).model_fields[last], SCENE_OPTIONS[key]
+    if option.kind in (int, float):
+        assert option.kind.__name__ in str(field.annotation)
+    told = re.search(r"default: ([\w.]+)\]", option.help)
+    default = getattr(RelaxOptions(), last) if key.startswith("relax.") else field.default
+    if told is not None and default is not None:
+        assert told[1] == f"{default:g}" if isinstance(default, float) else str(default)
 
 
 def test_version(command: Command):

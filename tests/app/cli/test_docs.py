@@ -28,9 +28,10 @@ import trimesh
 
 import warpflat
 from warpflat.app.cli.main import cli, main
+from warpflat.app.scene.as_toml import document_as_toml
 from warpflat.app.scene.load import make_scene
 from warpflat.core.errors import InputError
-from warpflat.core.toml_file import document_as_toml, read_toml
+from warpflat.core.toml_file import read_toml
 from warpflat.flat.surface.io.read import METRES_PER_UNIT
 from warpflat.garment.mannequin.body_model import BodyModel
 

@@ -13,10 +13,11 @@ import trimesh
 from bodies import body_of_size
 from command import Command
 
-from warpflat.app.scene.fit import FitJob, Fitted, ease_wishes, fit_to, require_own_study, study_table
+from warpflat.app.scene.fit import STUDY_FILES, FitJob, Fitted, ease_wishes, fit_to, study_table
 from warpflat.core.errors import InputError
-from warpflat.flat.surface.io.file_seams import file_seams
-from warpflat.flat.surface.io.sewn_panels import read_sewn_panels
+from warpflat.core.output import refuse_to_replace_others
+from warpflat.garment.construction.file_seams import file_seams
+from warpflat.garment.construction.sewn_panels import read_sewn_panels
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation
 from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.seams.layers import read_garment
@@ -143,7 +144,7 @@ def test_without_its_body_one_is_fitted_inside(tmp_path: Path):
         metrics = {"pieces": {"front": {"area_m2": 0.5}}, "verdict": verdict}
         ended = Fitted(carried=carried, folder=tmp_path, metrics=metrics, converged=True)
         assert ended.verdict().endswith("; it does not fit by its strain") is not fits
-        assert study_table([ended, ended])[1].split()[-1] == word
+        assert study_table([ended, ended]).splitlines()[1].split()[-1] == word
         assert ended.row()["fits"] is fits
     # Whatever the file's unit, the carried mesh is in metres.
     assert np.ptp(carried.vertices[:, 1]) == pytest.approx(0.55, abs=0.1)
@@ -194,7 +195,7 @@ def test_files_of_others_are_not_replaced(command: Command):
     Path("out/fit.json").unlink()
     Path("out/fit.csv").write_text("mine", encoding="utf-8")
     with pytest.raises(InputError, match=r"fit\.csv: is not of warpflat"):
-        require_own_study(Path("out"))
+        refuse_to_replace_others(Path("out"), STUDY_FILES)
 
 
 def test_ease_is_read_with_its_unit():

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from obj_files import write_obj
 
 from warpflat.app.scene.load import make_scene
 from warpflat.app.scene.run import run_scene
@@ -35,8 +36,7 @@ def _shorts(path: Path) -> None:
                 if inside[y][x]:
                     corners = [vertex(x + i, y + j, layer) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))]
                     faces.append(corners[::layer])
-    rows = [f"v {x} {y} {z}" for x, y, z in points] + ["f " + " ".join(str(k + 1) for k in face) for face in faces]
-    path.write_text("\n".join(rows) + "\n")
+    write_obj(path, (points, faces), digits="")
 
 
 def _run(folder: Path, cuts: list[dict[str, Any]]) -> Any:

@@ -14,8 +14,8 @@ from command import Command
 from scipy.spatial import cKDTree
 
 from warpflat.app.scene.outside_pattern import OutsideJob
-from warpflat.flat.surface.io.sewn_panels import read_sewn_panels
 from warpflat.garment.construction.as_cut import read_cut_pattern, worn_at
+from warpflat.garment.construction.sewn_panels import read_sewn_panels
 from warpflat.garment.draping.mesh_pieces import mesh_pieces
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation
 from warpflat.pattern.drafting.piece_parts import Edge

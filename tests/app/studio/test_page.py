@@ -229,9 +229,9 @@ def test_marks_vanish_with_undo_and_the_view_follows_the_size(tmp_path: Path) ->
         wait_for(lambda: page.is_idle and (page._shown_size != before).any())
         np.testing.assert_allclose(page._shown_size, page.stage.size)
         assert page._shown_size[0] > before[0]
-        page._choose_line(("front", "princess front left"))
+        page.choose_line(("front", "princess front left"))
         wait_for(lambda: page.session.preview is not None and page._picked is not None, 20.0)
-        page._go(page.session.undo)  # the cut that was only tried
+        page.undo()  # the cut that was only tried
         wait_for(lambda: page.is_idle and page.session.preview is None)
         assert page._picked is None
         assert page.session.can_undo == "size"

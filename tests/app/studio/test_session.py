@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from warpflat.app.cli.studio import scene_of_mesh
+from warpflat.app.scene.as_toml import document_as_toml
 from warpflat.app.scene.load import load_scene, make_scene
 from warpflat.app.scene.plan import plan_mesh
 from warpflat.app.studio.cut_tables import cut_along, cut_between, cuttable_lines
@@ -25,7 +26,6 @@ from warpflat.app.studio.session import Session
 from warpflat.app.studio.solve import solve
 from warpflat.app.studio.worker import Job, Superseded, Ticket, Worker
 from warpflat.core.errors import InputError
-from warpflat.core.toml_file import document_as_toml
 
 if sys.version_info >= (3, 11):
     import tomllib

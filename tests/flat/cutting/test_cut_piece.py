@@ -178,7 +178,7 @@ def test_a_tube_is_refused_uncut_and_lies_flat_once_cut_along_its_height():
     ring = np.concatenate([r * np.column_stack([np.sin(turn), np.cos(turn)]) for r in np.abs(reach) + 0.02])
     network = SpringNetwork.build(tube, warpflat.find_fabric("isotropic"), ring)
     closed = Relaxation(network, RelaxOptions(), start=ring).energies().potential
-    opened = apply_cut(tube, cut_along(tube.faces, at[:, 8], vertex_count=len(tube.vertices)))
+    opened = apply_cut(tube, cut_along(tube.faces, [at[:, 8]], vertex_count=len(tube.vertices)))
     result = warpflat.flatten(opened, fabric="isotropic", datum=at[:, 0], relax=FINE)
     assert stored(result) <= 1e-9 * closed
     girth = sectors * 2 * radius * math.sin(math.pi / sectors)

@@ -34,7 +34,7 @@ def ramp(along: int, across: int) -> Surface:
 @pytest.fixture
 def too_large(monkeypatch: pytest.MonkeyPatch) -> None:
     """Only meshes of at most 1,000 vertices are factored, and the coarsest has at most 400."""
-    monkeypatch.setattr(laplacian, "_MOST_VERTICES", 1_000)
+    monkeypatch.setattr(laplacian, "MOST_FACTORED", 1_000)
     monkeypatch.setattr(metric, "CHEAP", 400)
     monkeypatch.setattr(flatten_piece, "_COARSE", 400)
 
@@ -62,7 +62,7 @@ def test_the_v_cycle_is_symmetric_and_near_to_the_factor(triangles: bool):
 def test_the_minimum_is_that_of_the_factor(triangles: bool, fabric: str, monkeypatch: pytest.MonkeyPatch):
     given = {"datum": "centre", "fabric": fabric, "device": DEVICE}
     expected = flatten(make_shape("bodice", resolution=57, triangles=triangles), **given)
-    monkeypatch.setattr(laplacian, "_MOST_VERTICES", 1_000)
+    monkeypatch.setattr(laplacian, "MOST_FACTORED", 1_000)
     monkeypatch.setattr(metric, "CHEAP", 1_000)
     monkeypatch.setattr(flatten_piece, "_COARSE", 1_000)
     found = flatten(make_shape("bodice", resolution=57, triangles=triangles), **given)

@@ -192,7 +192,7 @@ def test_what_is_no_grid_has_no_profiles(line: str):
 
 def opened(whole: Surface, path: NDArray[np.int32], **lines: NDArray[np.int32]) -> tuple[Surface, NDArray[np.int32]]:
     """The surface with a crack along a path, and for each vertex the one that it was."""
-    made = cut_along(whole.faces, path, vertex_count=len(whole.vertices))
+    made = cut_along(whole.faces, [path], vertex_count=len(whole.vertices))
     surface = make_surface(whole.vertices[made.vertex_origin], made.faces, lines=lines)
     return surface, made.vertex_origin[surface.input_index]
 

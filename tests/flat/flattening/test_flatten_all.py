@@ -17,7 +17,6 @@ from warpflat.flat.flattening.flatten_all import flatten_all
 from warpflat.flat.flattening.flatten_piece import flatten
 from warpflat.flat.flattening.progress import Progress
 from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.model.join import join_networks, join_surfaces
 from warpflat.flat.model.network import SpringNetwork
 from warpflat.flat.model.wear import Wear
 from warpflat.flat.solver.metric import stiffness_matrix
@@ -25,9 +24,10 @@ from warpflat.flat.solver.options import RelaxOptions
 from warpflat.flat.solver.steps import Relaxation
 from warpflat.flat.surface.cells import make_cells
 from warpflat.flat.surface.connectivity import border_loops
-from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.mesh import Surface, join_surfaces
 from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.flat.surface.shapes import make_shape
+from warpflat.garment.construction.join_networks import join_networks
 
 CLOTH = Fabric(
     name="cloth",

@@ -14,6 +14,7 @@ import pytest
 import shapely
 from devices import DEVICE
 from numpy.typing import NDArray
+from obj_files import write_obj
 
 from warpflat.app.cli.main import main
 from warpflat.flat.cutting.cut_piece import cut
@@ -232,13 +233,7 @@ def test_two_runs_agree_bit_for_bit():
 
 
 def test_the_command_line_takes_the_gap_and_warns_of_an_overlap(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
-    strip = curled_strip()
-    lines = [
-        *(f"v {x} {y} {z}" for x, y, z in strip.vertices),
-        *(f"f {' '.join(map(str, f + 1))}" for f in strip.faces),
-    ]
-    mesh = tmp_path / "strip.obj"
-    mesh.write_text("\n".join(lines))
+    mesh = write_obj(tmp_path / "strip.obj", curled_strip(), digits="")
     bare = ["flatten", str(mesh), "--units", "m", "--no-picture", "--frames", "0", "--out", str(tmp_path / "out")]
     assert main([*bare, "--gap", "0"]) == 1
     error = capfd.readouterr().err

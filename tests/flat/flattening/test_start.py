@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from devices import DEVICE
 
+from warpflat.app.scene.read_layout import read_layout
 from warpflat.core.errors import InputError
 from warpflat.flat.flattening.flatten_piece import flatten
 from warpflat.flat.flattening.start import choose_start
 from warpflat.flat.surface.injective import is_injective
-from warpflat.flat.surface.io.read_layout import read_layout
 from warpflat.flat.surface.shapes import make_shape
 
 
@@ -62,11 +62,12 @@ def test_a_layout_is_read_from_texture_coordinates(tmp_path):
     file.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.5 0.5\nvt 0 0\nvt 1 0\nf 1/2 2/3 3/1\n")
     np.testing.assert_array_equal(read_layout(file), [[0, 0], [1, 0], [0.5, 0.5]])
     for text, words in (
-        ("v 0 0 0\nf 1 1 1\n", "no texture coordinates"),
-        ("v 0 0 0\nvt x\nf 1/1\n", "line 2"),
-        ("v 0 0 0\nvt 0 0\nvt 1 1\nf 1/1 1/2\n", "two texture coordinates"),
-        ("v 0 0 0\nvt 0 0\nf 1/9\n", "not in the file"),
+        ("f 1 2 3\n", "no texture coordinates"),
+        ("vt x\nf 1/1 2/1 3/1\n", "texture coordinates that are no two numbers"),
+        ("vt 0 0\nvt 1 1\nf 1/1 2/2 3/2\nf 1/2 3/2 2/2\n", "vertex 0 has two texture coordinates"),
+        ("vt 0 0\nf 1/1 2/1 3/9\n", "that the file does not have"),
+        ("vt 0 1e300\nf 1/1 2/1 3/1\n", "reach beyond"),
     ):
-        file.write_text(text)
+        file.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + text)
         with pytest.raises(InputError, match=words):
             read_layout(file)

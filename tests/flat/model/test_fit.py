@@ -12,11 +12,12 @@ import pytest
 from devices import DEVICE
 
 import warpflat
+from warpflat.app.cli.fit_lines import fit_lines
 from warpflat.app.scene.load import load_scene
 from warpflat.app.scene.run import run_scene
 from warpflat.core.errors import InputError
 from warpflat.flat.fabric.library import find_fabric
-from warpflat.flat.flattening.fit_report import fit_lines, garment_wear
+from warpflat.flat.flattening.fit_report import garment_wear
 from warpflat.flat.flattening.verdict import judge
 from warpflat.flat.model.fit import MAPS, assess_pattern
 from warpflat.flat.model.wear import Wear, intended_stretch

@@ -76,7 +76,7 @@ def test_a_closed_crack_is_opened_and_hardly_moved():
     whole = make_surface(*grid(9, 9))
     middle = np.flatnonzero(whole.vertices[:, 0] == np.median(whole.vertices[:, 0]))
     path = middle[np.argsort(whole.vertices[middle, 1])][:-2]
-    made = cut_along(whole.faces, path, vertex_count=len(whole.vertices))
+    made = cut_along(whole.faces, [path], vertex_count=len(whole.vertices))
     surface = make_surface(whole.vertices[made.vertex_origin], made.faces)
     layout = surface.vertices[:, :2].copy()
     assert len(layout) == len(whole.vertices) + len(path) - 1

@@ -19,8 +19,6 @@ def surface(vertices: NDArray, faces: NDArray, lines: Mapping[str, list[int]] | 
         faces=np.asarray(faces, dtype=np.int32),
         lines={name: np.asarray(line, dtype=np.int32) for name, line in (lines or {}).items()},
         name="front",
-        input_vertices=vertices,
-        input_index=np.arange(len(vertices), dtype=np.int32),
     )
 
 

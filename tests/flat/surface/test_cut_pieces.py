@@ -7,7 +7,7 @@ import pytest
 from cut_meshes import cylinder, edge_set, flat, grid, surface
 
 from warpflat.core.errors import InputError
-from warpflat.flat.surface.cut.cut_mesh import cut_along, cut_along_many
+from warpflat.flat.surface.cut.cut_mesh import cut_along
 from warpflat.flat.surface.cut.pieces import apply_cut, split_pieces
 
 FIVE = surface(
@@ -18,7 +18,7 @@ FIVE = surface(
 
 
 def cut_of(*paths):
-    return cut_along_many(FIVE.faces, paths, vertex_count=25)
+    return cut_along(FIVE.faces, paths, vertex_count=25)
 
 
 def as_lists(lines):
@@ -65,7 +65,7 @@ def test_every_carried_line_runs_along_edges_and_none_of_its_length_is_lost():
 def test_closed_line_around_a_tube_becomes_one_open_line():
     tube = cylinder(6, 3)
     tube = surface(tube.vertices, tube.faces, {"ring": [6, 7, 8, 9, 10, 11, 6]})
-    whole = apply_cut(tube, cut_along(tube.faces, [2, 8, 14], vertex_count=18))
+    whole = apply_cut(tube, cut_along(tube.faces, [[2, 8, 14]], vertex_count=18))
     ring = whole.lines["ring"]
     assert len(ring) == 7
     assert ring[0] != ring[-1]
@@ -92,14 +92,12 @@ def test_two_pieces_with_names_and_maps():
     assert sum(len(piece.face_index) for piece in pieces) == len(FIVE.faces)
 
 
-def test_names_by_height_by_hole_by_number_and_by_choice():
+def test_names_by_height_by_hole_and_by_number():
     assert {p.surface.name for p in split_pieces(FIVE, cut_of([10, 11, 12, 13, 14]))} == {"front.upper", "front.lower"}
     hole = split_pieces(FIVE, cut_of([6, 7, 8, 13, 18, 17, 16, 11, 6]))
     assert {p.surface.name: len(p.face_index) for p in hole} == {"front.outer": 12, "front.inner": 4}
     cross = split_pieces(FIVE, cut_of([2, 7, 12, 17, 22], [10, 11, 12, 13, 14]))
     assert [p.surface.name for p in cross] == ["front.1", "front.2", "front.3", "front.4"]
-    named = split_pieces(FIVE, cut_of([2, 7, 12, 17, 22]), names=["side panel", "centre panel"])
-    assert [p.surface.name for p in named] == ["side panel", "centre panel"]
     assert [p.surface.name for p in split_pieces(FIVE, cut_of([2, 7]))] == ["front"]
 
 
@@ -110,12 +108,6 @@ def test_lines_of_one_piece_keep_their_numbers_where_the_plain_name_would_be_tak
         if p.surface.name == "front.outer"
     )
     assert {name for name in outer.lines if name.startswith("waist")} == {"waist.1", "waist.3"}
-
-
-@pytest.mark.parametrize("names", [["a"], ["a", "a"], ["a", "b", "c"]])
-def test_wrong_names_are_refused(names):
-    with pytest.raises(InputError, match="give 2 different names"):
-        split_pieces(FIVE, cut_of([2, 7, 12, 17, 22]), names=names)
 
 
 def test_a_line_off_the_mesh_is_refused_by_name():

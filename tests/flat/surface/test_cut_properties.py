@@ -11,9 +11,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from warpflat.flat.surface.connectivity import euler_characteristic, non_manifold_vertices
-from warpflat.flat.surface.cut.cut_mesh import cut_along_many
+from warpflat.flat.surface.cut.cut_mesh import cut_along
 from warpflat.flat.surface.cut.pieces import apply_cut, split_pieces
-from warpflat.flat.surface.half_edges import border_edges, half_edges, non_manifold_edges
+from warpflat.flat.surface.half_edges import border_edges, half_edges
 from warpflat.flat.surface.triangles import corner_triangles
 
 SETTINGS = settings(max_examples=120, deadline=None, derandomize=True, database=None)
@@ -104,7 +104,7 @@ def union_count(faces, cut_edges):
 def test_a_cut_conserves_everything_but_the_topology(case):
     mesh, paths, degree, border = case
     count = len(mesh.vertices)
-    cut = cut_along_many(mesh.faces, paths, vertex_count=count)
+    cut = cut_along(mesh.faces, paths, vertex_count=count)
     cut_edges = {(min(a, b), max(a, b)) for path in paths for a, b in pairwise(path)}
 
     np.testing.assert_array_equal(glue(cut), mesh.faces)
@@ -112,7 +112,7 @@ def test_a_cut_conserves_everything_but_the_topology(case):
     np.testing.assert_array_equal(cut.faces < 0, mesh.faces < 0)
     used = np.unique(cut.faces[cut.faces >= 0])
     np.testing.assert_array_equal(used, np.arange(len(cut.vertex_origin)))
-    assert len(non_manifold_edges(cut.faces)) == 0
+    assert half_edges(cut.faces).count.max() <= 2
     assert len(non_manifold_vertices(cut.faces)) == 0
 
     copies = Counter(cut.vertex_origin.tolist())
@@ -132,7 +132,7 @@ def test_a_cut_conserves_everything_but_the_topology(case):
 @given(cuts())
 def test_the_seams_are_the_paths_and_match_vertex_by_vertex(case):
     mesh, paths, _, _ = case
-    cut = cut_along_many(mesh.faces, paths, vertex_count=len(mesh.vertices))
+    cut = cut_along(mesh.faces, paths, vertex_count=len(mesh.vertices))
     border = {tuple(edge) for edge in border_edges(cut.faces).tolist()}
     covered = Counter()
     for seam in cut.seams:
@@ -149,7 +149,7 @@ def test_the_seams_are_the_paths_and_match_vertex_by_vertex(case):
 @given(cuts())
 def test_the_surface_keeps_its_area_and_its_edges_and_falls_into_its_pieces(case):
     mesh, paths, _, _ = case
-    cut = cut_along_many(mesh.faces, paths, vertex_count=len(mesh.vertices))
+    cut = cut_along(mesh.faces, paths, vertex_count=len(mesh.vertices))
     whole = apply_cut(mesh, cut)
     np.testing.assert_array_equal(whole.input_vertices[whole.input_index], whole.vertices)
 
@@ -178,10 +178,10 @@ def test_the_surface_keeps_its_area_and_its_edges_and_falls_into_its_pieces(case
 def test_a_tube_or_cone_cut_along_a_generator_is_a_disk(around, rows, which):
     column = which % around
     tube = cylinder(around, rows)
-    cut = cut_along_many(tube.faces, [column + around * np.arange(rows)], vertex_count=len(tube.vertices))
+    cut = cut_along(tube.faces, [column + around * np.arange(rows)], vertex_count=len(tube.vertices))
     assert (cut.kind, euler_characteristic(cut.faces), cut.component_count) == ("opening", 1, 1)
     shape = cone(around, rows)
     apex = len(shape.vertices) - 1
     path = [*(column + around * np.arange(rows)).tolist(), apex]
-    cut = cut_along_many(shape.faces, [path], vertex_count=apex + 1)
+    cut = cut_along(shape.faces, [path], vertex_count=apex + 1)
     assert (cut.kind, euler_characteristic(cut.faces), cut.component_count) == ("dart", 1, 1)

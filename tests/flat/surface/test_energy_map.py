@@ -6,13 +6,7 @@ import numpy as np
 import pytest
 
 from warpflat.core.errors import InputError
-from warpflat.flat.surface.energy_map import (
-    energy_map,
-    energy_peak,
-    integrate_along,
-    integrate_faces,
-    smooth_to_vertices,
-)
+from warpflat.flat.surface.energy_map import energy_report, place_in_words, smooth_to_vertices
 from warpflat.flat.surface.mesh import Surface
 
 
@@ -31,8 +25,6 @@ def sheet(n: int = 11, *, triangles: bool = False, lines: dict[str, list[int]] |
         vertices=vertices,
         faces=faces.astype(np.int32),
         lines={name: np.array(line, dtype=np.int32) for name, line in (lines or {}).items()},
-        input_vertices=vertices,
-        input_index=np.arange(n * n, dtype=np.int32),
     )
 
 
@@ -81,24 +73,21 @@ def test_a_sliver_does_not_make_the_peak_once_smoothed():
     surface = sheet(triangles=True)
     vertices = surface.vertices.copy()
     vertices[60] = vertices[61] + [-1e-7, 1e-9, 0.0]
-    thin = Surface(
-        vertices=vertices, faces=surface.faces, input_vertices=vertices, input_index=np.arange(121, dtype=np.int32)
-    )
+    thin = Surface(vertices=vertices, faces=surface.faces)
     corner = vertices[thin.faces[:, :3]]
     area = 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     density = 1.0 + 4.0 * np.exp(-np.sum((corner.mean(axis=1) - [0.02, 0.02, 0]) ** 2, axis=1) / 0.01**2)
     density[np.argsort(area)[:2]] = 1000.0
     smooth = smooth_to_vertices(thin, density, smoothing_length=0.01)
     assert np.isfinite(smooth).all()
-    peak = energy_peak(thin, smooth)
-    assert np.linalg.norm(peak.position - [0.02, 0.02, 0]) < 0.012
+    assert np.linalg.norm(vertices[np.argmax(smooth)] - [0.02, 0.02, 0]) < 0.012
 
 
 def test_a_vertex_without_faces_and_a_face_without_area_have_no_density():
     surface = sheet(3)
     vertices = np.concatenate([surface.vertices, [[1.0, 1.0, 1.0]]])
     faces = np.concatenate([surface.faces, [[0, 0, 0, -1]]]).astype(np.int32)
-    odd = Surface(vertices=vertices, faces=faces, input_vertices=vertices, input_index=np.arange(10, dtype=np.int32))
+    odd = Surface(vertices=vertices, faces=faces)
     for length in (0.0, 0.01):
         smooth = smooth_to_vertices(odd, [1.0, 1.0, 1.0, 1.0, 7.0], smoothing_length=length)
         np.testing.assert_allclose(smooth[:9], 1.0)
@@ -107,76 +96,46 @@ def test_a_vertex_without_faces_and_a_face_without_area_have_no_density():
 
 def test_regions_add_up_to_the_total():
     surface = sheet()
-    density = np.random.default_rng(3).exponential(size=100)
+    energy = np.random.default_rng(3).exponential(size=100)
     upper = np.arange(100) >= 50
-    energy = energy_map(surface, density, regions={"upper": upper, "lower": np.flatnonzero(~upper), "none": []})
-    assert energy.total == pytest.approx(density.sum() * 1e-4)
-    assert energy.regions["upper"] + energy.regions["lower"] == pytest.approx(energy.total)
-    assert energy.regions["none"] == 0.0
-    assert integrate_faces(surface, density, {"twice": [7, 7]})["twice"] == pytest.approx(density[7] * 1e-4)
+    bricks = energy_report(surface, energy, regions={"upper": upper, "lower": ~upper, "none": upper & ~upper})["bricks"]
+    assert bricks["upper"] == pytest.approx(energy[50:].sum())
+    assert bricks["upper"] + bricks["lower"] == pytest.approx(energy.sum())
+    assert bricks["none"] == 0.0
 
 
-def test_integral_along_a_line_is_exact_for_a_linear_density():
+def test_a_line_has_its_mean_and_its_highest_density():
     surface = sheet(lines={"level": list(range(55, 66)), "point": [60]})
-    density = 2.0 + 30.0 * surface.vertices[:, 0]
-    along = integrate_along(surface, density, surface.lines["level"])
-    assert along.length == pytest.approx(0.1)
-    assert along.integral == pytest.approx(2.0 * 0.1 + 30.0 * 0.1**2 / 2)
-    assert along.mean == pytest.approx(along.integral / 0.1)
-    assert (along.peak, along.peak_vertex) == (pytest.approx(5.0), 65)
-    alone = integrate_along(surface, density, surface.lines["point"])
-    assert (alone.length, alone.integral, alone.mean) == (0.0, 0.0, pytest.approx(density[60]))
+    # Linear from face to face, and so at the vertices inside.
+    density = 2.0 + 30.0 * surface.vertices[surface.faces, 0].mean(axis=1)
+    lines = energy_report(surface, density * 1e-4)["lines"]
+    at_vertices = np.clip(2.0 + 30.0 * surface.vertices[55:66, 0], 2.15, 4.85)
+    assert lines["level"]["length_m"] == pytest.approx(0.1)
+    assert lines["level"]["mean_j_per_m2"] == pytest.approx((0.5 * (at_vertices[1:] + at_vertices[:-1])).mean())
+    assert lines["level"]["peak_j_per_m2"] == pytest.approx(4.85)
+    assert lines["point"] == pytest.approx({"length_m": 0.0, "mean_j_per_m2": 3.5, "peak_j_per_m2": 3.5})
 
 
-def test_the_peak_in_words():
+def test_a_place_in_words():
     surface = sheet(
         lines={"bust line": list(range(44, 55)), "princess line": list(range(3, 121, 11)), "hem": list(range(11))}
     )
-    density = np.zeros(121)
-    density[6 * 11 + 5] = 1.0
-    peak = energy_peak(surface, density, landmarks={"bust point": [0.05, 0.05, 0.0], "navel": 0})
-    assert peak.vertex == 71
-    assert list(peak.lines) == ["bust line", "princess line", "hem"]
-    assert peak.lines["princess line"] == pytest.approx(0.02)
-    assert peak.words == "20 mm above bust line, 20 mm from princess line; 10 mm from bust point"
-    density[4 * 11 + 5] = 2.0
-    on = energy_peak(surface, density, landmarks={"bust point": 4 * 11 + 5})
-    assert on.words == "on bust line, 20 mm from princess line; at bust point"
-    density[2 * 11 + 2] = 3.0
-    assert "20 mm below bust line" in energy_peak(surface, density).words
-    turned = energy_peak(surface, density, up=(0.0, -1.0, 0.0))
-    assert "20 mm above bust line" in turned.words
-    assert energy_peak(sheet(), density).words == "vertex 24 at (0.020, 0.020, 0.000) m"
+    assert place_in_words(surface, 6 * 11 + 5) == "20 mm above bust line, 20 mm from princess line"
+    assert place_in_words(surface, 4 * 11 + 5) == "on bust line, 20 mm from princess line"
+    assert "20 mm below bust line" in place_in_words(surface, 2 * 11 + 2)
+    assert place_in_words(sheet(), 24) == "vertex 24 at (0.020, 0.020, 0.000) m"
 
 
-def test_the_map_puts_it_all_together():
+def test_the_peak_is_where_most_energy_lies():
     surface = sheet(lines={"middle": list(range(55, 66))})
     centre = surface.vertices[surface.faces].mean(axis=1)
     density = np.exp(-np.sum((centre - [0.05, 0.05, 0.0]) ** 2, axis=1) / 0.02**2)
-    energy = energy_map(surface, density, landmarks={"apex": 60}, smoothing_length=0.005)
-    assert energy.peak.vertex == 60
-    assert energy.peak.words == "on middle; at apex"
-    assert energy.lines["middle"].peak_vertex == 60
-    assert energy.vertex_density[60] == energy.peak.density == energy.lines["middle"].peak
-    assert energy.vertex_density @ vertex_areas(surface) == pytest.approx(energy.total, rel=1e-12)
+    report = energy_report(surface, density * 1e-4)
+    assert report["peak"] == "on middle"
+    assert report["peak_j_per_m2"] == report["lines"]["middle"]["peak_j_per_m2"]
+    assert report["peak_j_per_m2"] == pytest.approx(smooth_to_vertices(surface, density)[60])
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda s: smooth_to_vertices(s, np.zeros(5)), "one value per face expected, 100 of them"),
-        (lambda s: smooth_to_vertices(s, np.r_[np.nan, np.zeros(99)]), "face 0 is not finite"),
-        (lambda s: smooth_to_vertices(s, np.zeros(100), smoothing_length=-1.0), "0 or more, got -1.0"),
-        (lambda s: integrate_faces(s, np.zeros(100), {"bust": [3, 100]}), "'bust': face 100 does not exist"),
-        (lambda s: integrate_faces(s, np.zeros(100), {"bust": [-1]}), "'bust': face -1 does not exist"),
-        (lambda s: integrate_faces(s, np.zeros(100), {"bust": [True, False]}), "2 flags for 100 faces"),
-        (lambda s: integrate_along(s, np.zeros(121), [3, 121]), "vertex 121 does not exist"),
-        (lambda s: integrate_along(s, np.zeros(121), []), "at least one"),
-        (lambda s: energy_peak(s, np.zeros(121), landmarks={"apex": 500}), "'apex': vertex 500 does not exist"),
-        (lambda s: energy_peak(s, np.zeros(121), landmarks={"apex": [0, 1]}), "'apex' is a vertex index or three"),
-        (lambda s: energy_peak(s, np.zeros(121), up=(0, 0, 0)), "up is a direction"),
-    ],
-)
-def test_refused(call, message):
-    with pytest.raises(InputError, match=message):
-        call(sheet())
+def test_an_energy_that_is_no_number_is_refused():
+    with pytest.raises(InputError, match="face 0 is not finite"):
+        energy_report(sheet(), np.r_[np.nan, np.zeros(99)])

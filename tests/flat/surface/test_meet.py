@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from obj_files import write_obj
 
 import warpflat
 from warpflat.app.cli.main import main
@@ -15,8 +16,8 @@ from warpflat.app.scene.load import make_scene
 from warpflat.app.scene.plan import plan_scene
 from warpflat.flat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.normals import flat_areas
 from warpflat.flat.surface.repair.meet import meet_borders
-from warpflat.flat.surface.repair.sheets import face_vectors
 from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.garment.construction.sew_pieces import meeting_borders, unsewn_borders
 
@@ -35,7 +36,7 @@ def moved(surface: Surface, by: object) -> Surface:
 
 
 def area(surface: Surface) -> float:
-    return float(np.linalg.norm(face_vectors(surface.vertices, surface.faces), axis=1).sum())
+    return float(flat_areas(surface.vertices, surface.faces).sum())
 
 
 def sewn(surfaces: list[Surface]) -> list[tuple[int, int]]:
@@ -132,21 +133,11 @@ def test_three_borders_at_one_place_are_named() -> None:
     assert any("third" in words for words in told)
 
 
-def write(path: Path, surfaces: list[Surface]) -> Path:
-    rows, first = list[str](), 1
-    for surface in surfaces:
-        rows += [f"o {surface.name}", *(f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in surface.vertices)]
-        rows += ["f " + " ".join(str(v + first) for v in face if v >= 0) for face in surface.faces.tolist()]
-        first += len(surface.vertices)
-    path.write_text("\n".join([*rows, ""]))
-    return path
-
-
 def test_seams_that_nearly_meet_are_sewn_from_the_command_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     right = moved(sheet(RIGHT, np.linspace(0, 0.3, 14), name="right"), [4e-4, 0, 0])
-    path = write(tmp_path / "two.obj", [sheet(LEFT, UP, name="left"), right])
+    path = write_obj(tmp_path / "two.obj", sheet(LEFT, UP, name="left"), right, names=("left", "right"))
     bare = ["flatten", str(path), "--units", "m", "--component", "all", "--frames", "0", "--no-picture", "-v"]
     assert main([*bare, "--out", str(tmp_path / "out")]) == 0
     assert "were made to meet" in capsys.readouterr().err
@@ -173,7 +164,8 @@ def tube(x: float) -> Surface:
 
 
 def test_datum_grain_cuts_and_opening_are_given_by_piece(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = write(tmp_path / "three.obj", [sheet(LEFT, UP, name="left"), sheet(RIGHT, UP, name="right"), tube(1.0)])
+    parts = [sheet(LEFT, UP, name="left"), sheet(RIGHT, UP, name="right"), tube(1.0)]
+    path = write_obj(tmp_path / "three.obj", *parts, names=[part.name for part in parts])
     bare = ["flatten", str(path), "--units", "m", "--component", "all", "--frames", "0", "--no-picture", "--quiet"]
     given = ["--datum", "left:bottom", "--datum", "right:0,60", "--grain-angle", "right:45", "--open", "sleeve:5,133"]
     assert main([*bare, *given, "--out", str(tmp_path / "out")]) == 0

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from warpflat.core.errors import InputError
-from warpflat.flat.surface.io.read_obj import ObjMesh, read_obj
+from warpflat.flat.surface.io.raw_mesh import RawMesh
+from warpflat.flat.surface.io.read_obj import read_obj
 from warpflat.flat.surface.io.read_pieces import read_pieces
 
 GRID = 12
@@ -40,7 +41,7 @@ def expected() -> tuple[np.ndarray, np.ndarray]:
     return positions, polygons
 
 
-def read(text: str, path: Path) -> ObjMesh:
+def read(text: str, path: Path) -> RawMesh:
     path.write_bytes(text.encode())
     return read_obj(path)
 
@@ -87,7 +88,7 @@ def test_file_is_read_whole(name: str, tmp_path: Path) -> None:
     positions, polygons = expected()
     np.testing.assert_allclose(mesh.vertices, positions, rtol=0, atol=0.06 if name == "short numbers" else 0)
     np.testing.assert_array_equal(mesh.polygons, polygons)
-    assert mesh.lines == {"side": [[0, 1, 2]]}
+    assert {name: row.tolist() for name, row in mesh.chains.items()} == {"side": [0, 1, 2]}
     assert mesh.objects[0] == [(0, "piece")]
     assert mesh.split_corners == (name in ("texture", "texture and normal", "Windows"))
 

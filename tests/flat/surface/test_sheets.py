@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from obj_files import write_obj
 
 import warpflat
 from warpflat.app.cli.main import main
@@ -49,13 +50,6 @@ def sleeve(around: int = 24, rows: int = 21) -> tuple[np.ndarray, np.ndarray]:
     ).reshape(-1, 3)
     at = np.arange(rows * around).reshape(rows, around)
     return points, np.stack([at[:-1], at[1:], np.roll(at, -1, 1)[1:], np.roll(at, -1, 1)[:-1]], -1).reshape(-1, 4)
-
-
-def write(path: Path, vertices: np.ndarray, faces: object) -> Path:
-    rows = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices]
-    rows += ["f " + " ".join(str(int(k) + 1) for k in face) for face in faces]  # type: ignore[attr-defined]
-    path.write_text("\n".join([*rows, ""]))
-    return path
 
 
 @pytest.mark.parametrize("thickness", [0.0005, 0.002, 0.006])
@@ -118,7 +112,7 @@ def test_thick_pieces_are_flattened_from_the_command_line(tmp_path: Path, capsys
     count = len(first[0])
     vertices = np.vstack([first[0], second[0] + [1.0, 0.0, 0.0]])
     faces = [*first[1], *([k + count for k in face] for face in second[1])]
-    path = write(tmp_path / "thick.obj", vertices, faces)
+    path = write_obj(tmp_path / "thick.obj", (vertices, faces))
     pieces = warpflat.read_pieces(path, units="m")
     assert [len(border_loops(piece.faces)) for piece in pieces] == [1, 2]
     assert [len(border_loops(layer.faces)) for layer in read_garment(path, units="m").layers] == [1, 2]
@@ -126,18 +120,6 @@ def test_thick_pieces_are_flattened_from_the_command_line(tmp_path: Path, capsys
     assert main(["flatten", str(path), *bare, "--component", "all", "--out", str(tmp_path / "all"), "-v"]) == 0
     assert capsys.readouterr().err.count("2 mm thick: its outer sheet was taken") == 2
     assert set(json.loads((tmp_path / "all" / "metrics.json").read_text())["pieces"]) == {"thick_1", "thick_2"}
-
-
-def parts(*meshes: tuple[np.ndarray, object], path: Path, names: tuple[str, ...] = ()) -> Path:
-    """An OBJ file of several meshes, each an object of its own."""
-    rows, before = list[str](), 1
-    for number, (vertices, faces) in enumerate(meshes):
-        rows += [f"o {names[number]}"] if names else []
-        rows += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices]
-        rows += ["f " + " ".join(str(before + int(k)) for k in face) for face in faces]  # type: ignore[attr-defined]
-        before += len(vertices)
-    path.write_text("\n".join([*rows, ""]))
-    return path
 
 
 def shells(sheet, thickness: float, turned: bool = False) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -164,7 +146,7 @@ def test_two_sheets_without_a_rim_are_one_cloth(
 ) -> None:
     both = shells(sheet, thickness, turned)
     outer = both[0][0]
-    for read in three_readings(parts(*both[::order], path=tmp_path / "shells.obj")):
+    for read in three_readings(write_obj(tmp_path / "shells.obj", *both[::order])):
         assert len(read) == 1
         assert np.abs(read[0].vertices[:, None] - outer[None]).max(axis=2).min(axis=1).max() < 1e-8
         note = next(note for note in read[0].notes if "thick" in note)
@@ -199,14 +181,8 @@ def test_sheets_and_a_rim_apart_with_a_pocket_and_a_coarser_inner_side(tmp_path:
     names = ("inside", "outside", "side", "pocket")
     for below in (inner_faces, coarser):
         used, number = np.unique(below, return_inverse=True)
-        path = parts(
-            (inner[used], number.reshape(below.shape)),
-            (outer, faces),
-            rim,
-            pocket,
-            path=tmp_path / "coat.obj",
-            names=names,
-        )
+        inside = inner[used], number.reshape(below.shape)
+        path = write_obj(tmp_path / "coat.obj", inside, (outer, faces), rim, pocket, names=names)
         pieces = warpflat.read_pieces(path, units="m")
         assert [piece.name for piece in pieces] == ["outside", "pocket"]
         words = " ".join(pieces[0].notes)
@@ -219,7 +195,7 @@ def test_sheets_that_look_the_same_way_or_lie_unevenly_stay_two(tmp_path: Path) 
     lining = inner, faces[:, ::-1]
     wedge = outer[0] - np.linspace(0.0, 0.02, len(inner))[:, None] * [0, 0, 1], faces
     for second in (lining, wedge):
-        assert len(warpflat.read_pieces(parts(outer, second, path=tmp_path / "two.obj"), units="m")) == 2
+        assert len(warpflat.read_pieces(write_obj(tmp_path / "two.obj", outer, second), units="m")) == 2
 
 
 def with_fin(height: float = 0.02) -> tuple[np.ndarray, list[list[int]], int]:
@@ -248,7 +224,7 @@ def test_a_large_sheet_at_an_edge_is_a_piece_of_its_own(tmp_path: Path) -> None:
     with pytest.raises(warpflat.InputError, match=r"faces meet there .* falls into 2 sheets of 500 and 15 faces"):
         make_surface(vertices, faces)
     assert len(make_surface(vertices, faces, component=1).faces) == fin
-    path = write(tmp_path / "fin.obj", vertices, faces)
+    path = write_obj(tmp_path / "fin.obj", (vertices, faces))
     pieces = warpflat.read_pieces(path, units="m")
     assert [len(piece.faces) for piece in pieces] == [len(faces) - fin, fin]
     assert any("1 sheet came off" in note for note in pieces[0].notes)
@@ -265,7 +241,7 @@ def test_a_pocket_comes_off_whole_and_the_front_under_it_stays(tmp_path: Path) -
         for face in np.stack([patch[:-1, :-1], patch[:-1, 1:], patch[1:, 1:], patch[1:, :-1]], -1).reshape(-1, 4)
     ]
     vertices = np.vstack([points, points[inside.ravel()] + [0, 0, 0.008]])
-    pieces = warpflat.read_pieces(write(tmp_path / "pocket.obj", vertices, [*pocket, *quads.tolist()]), units="m")
+    pieces = warpflat.read_pieces(write_obj(tmp_path / "pocket.obj", (vertices, [*pocket, *quads.tolist()])), units="m")
     assert sorted(len(piece.faces) for piece in pieces) == [len(pocket), len(quads)]
     front = max(pieces, key=lambda piece: len(piece.faces))
     assert set(front.input_index.tolist()) == set(range(len(points)))
@@ -278,7 +254,9 @@ def test_doubled_faces_with_vertices_of_their_own_are_one_sheet(
     for apart in (0.0, 2e-5):
         points, quads = sleeve(16, 11)
         vertices = np.vstack([points, points + apart])
-        path = write(tmp_path / "double.obj", vertices, [*quads.tolist(), *(quads[:, ::-1] + len(points)).tolist()])
+        path = write_obj(
+            tmp_path / "double.obj", (vertices, [*quads.tolist(), *(quads[:, ::-1] + len(points)).tolist()])
+        )
         for more in ([], ["--component", "all"], ["--seams", "auto"]):
             out = tmp_path / f"{apart}{''.join(more)}"
             bare = ["--units", "m", "--frames", "0", "--no-picture", "-v", "--out", str(out)]
@@ -309,9 +287,8 @@ def test_layers_that_lie_on_each_other_in_part_are_told_with_their_area(finer: b
     left, right = quads[column.max(axis=1) <= 14], quads[column.min(axis=1) >= 8]
     if finer:  # by triangles: no face has the vertices of another
         right = np.concatenate([right[:, [0, 1, 3]], right[:, [1, 2, 3]]])
-    path = parts(
-        some_faces(points, left), some_faces(points, right), path=tmp_path / "two.obj", names=("left", "right")
-    )
+    both = some_faces(points, left), some_faces(points, right)
+    path = write_obj(tmp_path / "two.obj", *both, names=("left", "right"))
     pieces = warpflat.read_pieces(path, units="m")
     assert [piece.name for piece in pieces] == ["left", "right"]
     assert [note for note in pieces[0].notes if "left and right lie on each other over 622 cm2" in note]
@@ -323,9 +300,8 @@ def test_layers_that_lie_on_each_other_in_part_are_told_with_their_area(finer: b
         note for note in layer.notes if "of 622 cm2 dropped: a second layer that lies on another part there" in note
     ]
     # Side by side they are no second layer.
-    apart = parts(
-        some_faces(points, left), some_faces(points, quads[column.min(axis=1) >= 14]), path=tmp_path / "side.obj"
-    )
+    beside = some_faces(points, quads[column.min(axis=1) >= 14])
+    apart = write_obj(tmp_path / "side.obj", some_faces(points, left), beside)
     assert not any("lie on each other" in note for note in warpflat.read_pieces(apart, units="m")[0].notes)
 
 
@@ -341,12 +317,12 @@ def test_thick_panels_that_are_glued_rim_to_rim_are_one_sheet_each(welded: bool,
         )
 
     both = panel(0.0), panel(0.3)
-    path = parts(*both, path=tmp_path / "glued.obj", names=("one", "other"))
+    path = write_obj(tmp_path / "glued.obj", *both, names=("one", "other"))
     if welded:
         count = len(both[0][0])
         places, number = np.unique(np.vstack([each[0] for each in both]).round(9), axis=0, return_inverse=True)
         faces = [*both[0][1], *([k + count for k in face] for face in both[1][1])]
-        path = write(tmp_path / "welded.obj", places, [[number.ravel()[k] for k in face] for face in faces])
+        path = write_obj(tmp_path / "welded.obj", (places, [[number.ravel()[k] for k in face] for face in faces]))
     pieces, (layer,) = warpflat.read_pieces(path, units="m"), read_garment(path, units="m").layers
     assert [len(piece.faces) for piece in pieces] == ([600] if welded else [300, 300])
     assert (len(layer.faces), len(border_loops(layer.faces))) == (600, 1)
@@ -361,7 +337,7 @@ def test_thick_panels_whose_outer_edges_alone_touch_are_one_sheet_each(tmp_path:
     beside = np.stack([edge + np.array([0.02 * k, 0.0, 0.0]) for k in range(16)], axis=1).reshape(-1, 3)
     at = np.arange(26 * 16).reshape(26, 16)
     quads = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], -1).reshape(-1, 4)
-    path = parts(solidified(*bodice(), 0.003), solidified(beside, quads, 0.003), path=tmp_path / "rims.obj")
+    path = write_obj(tmp_path / "rims.obj", solidified(*bodice(), 0.003), solidified(beside, quads, 0.003))
     (layer,) = read_garment(path, units="m").layers
     assert (len(layer.faces), len(border_loops(layer.faces))) == (875, 1)
     assert sum("3 mm thick" in note for note in layer.notes) == 2

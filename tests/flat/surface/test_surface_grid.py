@@ -25,7 +25,7 @@ def piece(solid: BoolArray, *, seed: int = 0, crack: list[tuple[int, int]] | Non
     y, x = np.divmod(np.arange(i.size), columns + 1)
     vertices = np.column_stack([0.01 * x, 0.01 * y, 0.0 * x])
     if crack is not None:
-        made = cut_along(faces, [int(i[at]) for at in crack], vertex_count=len(vertices))
+        made = cut_along(faces, [[int(i[at]) for at in crack]], vertex_count=len(vertices))
         faces, vertices = made.faces, vertices[made.vertex_origin]
     faces = np.stack([np.roll(face, turn) for face, turn in zip(faces, rng.integers(4, size=len(faces)), strict=True)])
     used = rng.permutation(np.unique(faces))

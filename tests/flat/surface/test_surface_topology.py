@@ -19,11 +19,9 @@ from warpflat.flat.surface.connectivity import (
 )
 from warpflat.flat.surface.half_edges import (
     border_edges,
-    edge_faces,
     half_edges,
     half_edges_of,
     mesh_edges,
-    non_manifold_edges,
     opposite_half_edges,
 )
 from warpflat.flat.surface.mesh import Surface
@@ -57,9 +55,6 @@ def shuffled_meshes(draw):
 
 def test_mixed_mesh_has_the_edges_of_both_kinds_and_no_diagonal():
     assert mesh_edges(MIXED).tolist() == [[0, 1], [0, 3], [1, 2], [1, 4], [2, 3], [2, 4]]
-    edges, beside = edge_faces(MIXED)
-    assert beside[edges.tolist().index([1, 2])].tolist() == [0, 1]
-    assert beside[edges.tolist().index([0, 1])].tolist() == [0, -1]
 
 
 def test_three_columns_are_triangles():
@@ -118,10 +113,10 @@ def test_inconsistent_border_is_refused():
         border_loops(turned(grid(3, 2)[1], [True, False]))
 
 
-def test_non_manifold_edge_is_found():
-    book = np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]])
-    assert non_manifold_edges(book).tolist() == [[0, 1]]
-    assert len(non_manifold_edges(MIXED)) == 0
+def test_the_faces_at_an_edge_are_counted():
+    book = half_edges(np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]]))
+    assert book.edges[book.count > 2].tolist() == [[0, 1]]
+    assert half_edges(MIXED).count.tolist() == [1, 1, 2, 1, 1, 1]
 
 
 def test_bow_tie_is_found_whether_open_or_closed():
@@ -301,7 +296,7 @@ def test_nodes_that_are_joined_have_one_label_and_first_nodes_come_first(nodes, 
 
 def test_half_edges_of_a_surface_are_made_once_and_not_to_be_changed():
     vertices, quads = grid(3, 3)
-    surface = Surface(vertices=vertices, faces=quads, input_vertices=vertices, input_index=np.arange(9, dtype=np.int32))
+    surface = Surface(vertices=vertices, faces=quads)
     he = half_edges_of(surface)
     assert half_edges_of(surface) is he
     for name, values in vars(half_edges(quads)).items():

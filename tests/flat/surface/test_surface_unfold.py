@@ -144,7 +144,7 @@ def test_a_cut_changes_no_crease_where_the_body_curves_both_ways(column: int):
     """There one side of the cut alone would tell another normal than both."""
     body = make_shape("bodice", resolution=13)
     line = np.arange(169, dtype=np.int32).reshape(13, 13)[:8, column]
-    cut = cut_along(body.faces, np.ascontiguousarray(line), vertex_count=169)
+    cut = cut_along(body.faces, [np.ascontiguousarray(line)], vertex_count=169)
     before = quad_creases(body.vertices, body.faces)
     assert (before >= 0).any()
     np.testing.assert_array_equal(quad_creases(body.vertices[cut.vertex_origin], cut.faces), before)

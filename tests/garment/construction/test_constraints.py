@@ -13,10 +13,10 @@ from warpflat.core.errors import InputError
 from warpflat.flat.fabric.fabric import grain_axes
 from warpflat.flat.flattening.flatten_piece import flatten
 from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.model.constraint_equations import smooth_equations
 from warpflat.flat.solver.options import RelaxOptions
 from warpflat.flat.solver.steps import Relaxation
 from warpflat.flat.surface.shapes import make_shape
+from warpflat.garment.construction.constraint_equations import smooth_equations
 from warpflat.garment.construction.constraints import Constraint, FixedLength, Straight, Symmetric
 from warpflat.garment.construction.sewing import sew
 from warpflat.garment.construction.sewn import Sewn

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from bodies import body_of_size
 
+from warpflat.app.cli.fit_lines import fit_lines
 from warpflat.app.scene.load import load_scene
 from warpflat.app.scene.run import run_scene
 from warpflat.core.errors import InputError
@@ -19,7 +20,6 @@ from warpflat.flat.cutting.cut_piece import cut
 from warpflat.flat.cutting.cut_plan import CutPlan
 from warpflat.flat.cutting.remedies import advise
 from warpflat.flat.flattening.edit import change_fabric, change_surface
-from warpflat.flat.flattening.fit_report import fit_lines
 from warpflat.flat.flattening.flatten_piece import flatten
 from warpflat.flat.flattening.result import Flattening
 from warpflat.flat.model.wear import Wear

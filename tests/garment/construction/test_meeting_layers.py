@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from obj_files import write_obj
 
 from warpflat.flat.surface.io.read import read_surface
 from warpflat.flat.surface.io.read_pieces import read_pieces
@@ -21,16 +22,6 @@ def _sheet(columns: int = 9, rows: int = 11) -> tuple[Any, Any]:
     at = np.arange(rows * columns).reshape(rows, columns)
     quads = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 4)
     return np.stack([u, v, 0.04 * np.sin(np.pi * u / 0.3) * np.sin(np.pi * v / 0.4)], axis=-1), quads
-
-
-def _write(path: Path, *parts: tuple[Any, Any]) -> Path:
-    rows, before = list[str](), 1
-    for number, (points, faces) in enumerate(parts):
-        rows += [f"o part{number}", *(f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(points).tolist())]
-        rows += ["f " + " ".join(str(before + k) for k in face) for face in faces.tolist()]
-        before += len(points)
-    path.write_text("\n".join(rows) + "\n")
-    return path
 
 
 def _doubled(kind: str) -> tuple[Any, Any]:
@@ -51,7 +42,7 @@ def _doubled(kind: str) -> tuple[Any, Any]:
 @pytest.mark.parametrize("kind", ["turned over", "shifted", "renumbered", "in triangles", "a part"])
 def test_a_second_layer_is_dropped_with_a_note(kind: str, tmp_path: Path):
     second = _doubled(kind)
-    path = _write(tmp_path / "double.obj", _sheet(), second)
+    path = write_obj(tmp_path / "double.obj", _sheet(), second, names=("part0", "part1"), digits="")
     area = "308" if kind == "a part" else "1,2"
     for pieces in (read_pieces(path, units="m"), (read_surface(path, units="m"),)):
         assert len(pieces) == 1
@@ -69,7 +60,9 @@ def _surfaces(*parts: tuple[Any, Any]) -> dict[str, Surface]:
 def test_a_lining_is_a_piece_of_its_own_and_not_sewn_all_around(order: int, tmp_path: Path):
     points, quads = _sheet()
     lining = points * [1, 1, 0.99]  # its border is that of the outer layer, inside it keeps up to 0.4 mm away
-    path = _write(tmp_path / "lined.obj", (points, quads), (lining, quads[:, ::order]))
+    path = write_obj(
+        tmp_path / "lined.obj", (points, quads), (lining, quads[:, ::order]), names=("part0", "part1"), digits=""
+    )
     pieces = {piece.name: piece for piece in read_pieces(path, units="m")}
     assert len(pieces) == 2
     assert meeting_borders(pieces) == []

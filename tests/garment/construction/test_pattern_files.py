@@ -14,6 +14,7 @@ import ezdxf
 import numpy as np
 import pytest
 import shapely
+from obj_files import write_obj
 from printed import faults
 from sample_dress import sample_dress
 
@@ -305,11 +306,10 @@ def test_what_lies_over_itself_in_the_plane_is_said_in_the_metrics_and_by_the_ex
     # A spiral ramp: developed, it goes round by more than a full turn.
     turn, out = np.meshgrid(np.linspace(0, 2.6 * np.pi, 41), np.linspace(0.1, 0.2, 5))
     ramp = np.stack([out * np.cos(turn), out * np.sin(turn), 0.03 * turn], axis=-1).reshape(-1, 3)
-    i = np.arange(len(ramp)).reshape(turn.shape) + 1
+    i = np.arange(len(ramp)).reshape(turn.shape)
     quads = np.stack([i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]], axis=-1).reshape(-1, 4)
-    lines = [f"v {x} {y} {z}" for x, y, z in ramp] + [f"f {a} {b} {c} {d}" for a, b, c, d in quads]
-    (tmp_path / "ramp.obj").write_text("\n".join(lines))
-    parted = ["flatten", str(tmp_path / "ramp.obj"), "--units", "m", "--out", str(tmp_path / "out"), "--no-picture"]
+    path = write_obj(tmp_path / "ramp.obj", (ramp, quads), digits="")
+    parted = ["flatten", str(path), "--units", "m", "--out", str(tmp_path / "out"), "--no-picture"]
     parted += ["--frames", "0"]
     assert main([*parted, "--quiet"]) == 0
     assert capfd.readouterr().err == ""

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from bodies import body_of_size
 
+from warpflat.app.cli.fit_lines import fit_lines
 from warpflat.flat.fabric.library import find_fabric
-from warpflat.flat.flattening.fit_report import fit_lines
 from warpflat.garment.construction.tapes import stretch_tape
 from warpflat.garment.construction.wearer import assess_wearer, tension_around
 from warpflat.garment.mannequin.forms import form_from_mapping

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from bodies import body_of_size
+from plain_patterns import ARMHOLE, SLEEVE, TOP, polygon, sewn, top
 
 import warpflat
 from warpflat.core.errors import InputError
@@ -17,28 +18,7 @@ from warpflat.garment.draping.mesh_pieces import mesh_pieces, sew_meshes
 from warpflat.garment.draping.openings import Opening, find_openings
 from warpflat.garment.draping.sew_around import stretches
 from warpflat.garment.draping.sewn_cloth import SewnCloth
-from warpflat.pattern.drafting.piece_parts import Edge
-from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
-
-# Corners of half a top, counter-clockwise from the hem's left end: sides, armholes, shoulders and the neck between these.
-TOP = [(0.0, 0.0), (0.5, 0.0), (0.5, 0.35), (0.43, 0.56), (0.34, 0.58), (0.16, 0.58), (0.07, 0.56), (0.0, 0.35)]
-ARMHOLE = 2.0 * float(np.hypot(0.07, 0.21))
-SLEEVE = [(0.0, 0.0), (ARMHOLE, 0.0), (ARMHOLE, 0.25), (0.0, 0.25)]
-
-
-def piece(name: str, corners: Sequence[tuple[float, float]], **more: object) -> Piece:
-    ring = np.array([*corners, corners[0]])
-    edges = [Edge(name=f"e{k}", points=ring[k : k + 2]) for k in range(len(corners))]
-    return Piece(name=name, edges=edges, **more)  # type: ignore[arg-type]
-
-
-def joined(first: str, second: str) -> Seam:
-    """Sides "piece.edge + piece.edge"; the second runs against its edges."""
-    sides = [
-        tuple(SeamSide(piece=p, edge=e, reversed=k == 1) for p, e in (word.split(".") for word in text.split(" + ")))
-        for k, text in enumerate((first, second))
-    ]
-    return Seam(name=f"{first} {second}", sides=(sides[0], sides[1]))
+from warpflat.pattern.drafting.pieces import Piece, Seam
 
 
 def lay(pieces: Sequence[Piece], seams: Sequence[Seam], **more: object) -> tuple[SewnCloth, list[Opening], Laid]:
@@ -52,14 +32,6 @@ def lay(pieces: Sequence[Piece], seams: Sequence[Seam], **more: object) -> tuple
 
 def middle(cloth: SewnCloth, laid: Laid, name: str) -> np.ndarray:
     return np.asarray(laid.positions[cloth.welded[cloth.piece_vertices[name]]].mean(axis=0))
-
-
-def top(first: str = "p", second: str = "q") -> tuple[list[Piece], list[Seam]]:
-    """A top of two pieces with two sleeves, one of which is drawn upside down."""
-    pieces = [piece(first, TOP), piece(second, TOP), piece("l", SLEEVE), piece("r", SLEEVE)]
-    seams = [joined(f"{first}.e{k}", f"{second}.e{8 - k}") for k in (1, 3, 5, 7)]
-    seams += [joined("l.e1", "l.e3"), joined("r.e1", "r.e3")]
-    return pieces, [*seams, joined(f"{first}.e2 + {second}.e6", "l.e2"), joined(f"{second}.e2 + {first}.e6", "r.e0")]
 
 
 @pytest.mark.parametrize("swapped", [False, True])
@@ -86,24 +58,24 @@ def test_a_cuff_goes_with_its_sleeve_and_a_hood_around_the_head():
     pieces, seams = top()
     cuff = [(0.0, 0.0), (ARMHOLE, 0.0), (ARMHOLE, 0.06), (0.0, 0.06)]
     half = [(0.0, 0.0), (0.18, 0.0), (0.18, 0.3), (0.0, 0.3)]
-    seams += [joined("l.e0", "m.e2"), joined("m.e1", "m.e3"), joined("r.e2", "n.e2"), joined("n.e1", "n.e3")]
-    pieces += [piece("m", cuff), piece("n", cuff)]
+    seams += [sewn("l.e0", "m.e2"), sewn("m.e1", "m.e3"), sewn("r.e2", "n.e2"), sewn("n.e1", "n.e3")]
+    pieces += [polygon("m", cuff), polygon("n", cuff)]
     _, openings, laid = lay(pieces, seams)
     found = {limb: opening.pieces for limb, opening in zip(laid.limbs, openings, strict=True) if limb}
     assert set(found) == {"left arm", "right arm"}
     assert set(found.values()) == {frozenset("m"), frozenset("n")}
     assert not laid.hooded
-    seams += [joined("p.e4", "x.e0"), joined("q.e4", "y.e0"), joined("x.e2", "y.e2"), joined("x.e1", "y.e3")]
-    laid = lay([*pieces, piece("x", half), piece("y", half)], seams)[2]
+    seams += [sewn("p.e4", "x.e0"), sewn("q.e4", "y.e0"), sewn("x.e2", "y.e2"), sewn("x.e1", "y.e3")]
+    laid = lay([*pieces, polygon("x", half), polygon("y", half)], seams)[2]
     assert sorted(laid.limbs) == ["", "", "left arm", "right arm"]
 
 
 def test_a_skirt_hangs_from_the_waist_and_is_as_symmetric_as_it_is_drawn():
     """Its upper edge is told by how it is drawn; a front is told by `at`, and a slit is no opening of its own."""
     shape = [(0.0, 0.0), (0.6, 0.0), (0.52, 0.5), (0.08, 0.5)]
-    seams = [joined("a.e1", "b.e3"), joined("b.e1", "a.e3")]
+    seams = [sewn("a.e1", "b.e3"), sewn("b.e1", "a.e3")]
     for at in ("front", "back"):
-        cloth, openings, laid = lay([piece("a", shape, at=at), piece("b", shape)], seams)
+        cloth, openings, laid = lay([polygon("a", shape, at=at), polygon("b", shape)], seams)
         assert laid.limbs == ["", ""]
         assert laid.level.all()
         other = "a" if at == "front" else "b"
@@ -113,11 +85,11 @@ def test_a_skirt_hangs_from_the_waist_and_is_as_symmetric_as_it_is_drawn():
     assert waist.mean() == pytest.approx(body_of_size(30.0).levels()["waist"].height, abs=0.02)
     assert laid.positions[openings[0].vertices, 1].mean() < waist.mean() - 0.4
     assert np.abs(stretches(cloth, laid.positions)).max() < 0.2
-    lower = lay([piece("a", shape), piece("b", shape)], seams, top="hip")[2].positions
+    lower = lay([polygon("a", shape), polygon("b", shape)], seams, top="hip")[2].positions
     hip = body_of_size(30.0).levels()["hip"].height
     assert lower[openings[1].vertices, 1].mean() == pytest.approx(hip, abs=0.02)
     with pytest.raises(InputError, match="level 'hop' is unknown"):
-        lay([piece("a", shape), piece("b", shape)], seams, top="hop")
+        lay([polygon("a", shape), polygon("b", shape)], seams, top="hop")
 
 
 @pytest.mark.parametrize("hem", [0.2, 0.36])
@@ -128,13 +100,13 @@ def test_each_leg_goes_around_its_own(hem: float):
     # Each leg: the side seam, then the inside of the leg; the crotch joins both fronts and both backs.
     mirrored = [(-x, y) for x, y in front[::-1]]
     pieces = [
-        piece(names[0], mirrored), piece(names[1], front), piece(names[2], front), piece(names[3], mirrored),
+        polygon(names[0], mirrored), polygon(names[1], front), polygon(names[2], front), polygon(names[3], mirrored),
     ]  # fmt: skip
     # Edges of `front`: e0 hem, e1 inside, e2 crotch, e3 waist, e4 side; mirrored: e0 waist, e1 crotch, e2 inside, e3 hem, e4 side.
     seams = [
-        joined(f"{names[0]}.e4", f"{names[1]}.e4"), joined(f"{names[2]}.e4", f"{names[3]}.e4"),
-        joined(f"{names[0]}.e2", f"{names[1]}.e1"), joined(f"{names[2]}.e1", f"{names[3]}.e2"),
-        joined(f"{names[0]}.e1", f"{names[2]}.e2"), joined(f"{names[1]}.e2", f"{names[3]}.e1"),
+        sewn(f"{names[0]}.e4", f"{names[1]}.e4"), sewn(f"{names[2]}.e4", f"{names[3]}.e4"),
+        sewn(f"{names[0]}.e2", f"{names[1]}.e1"), sewn(f"{names[2]}.e1", f"{names[3]}.e2"),
+        sewn(f"{names[0]}.e1", f"{names[2]}.e2"), sewn(f"{names[1]}.e2", f"{names[3]}.e1"),
     ]  # fmt: skip
     cloth, openings, laid = lay(pieces, seams)
     assert sorted(laid.limbs) == ["", "left leg", "right leg"]
@@ -155,12 +127,12 @@ def test_what_goes_around_nothing_is_refused_in_a_line():
     left, right = ([(x, y) for x, y in half] for half in (TOP[1:6], TOP))
     half = [(0.25, 0.0), *left[:4], (0.25, 0.58)]
     mirrored = [(0.5 - x, y) for x, y in half[::-1]]
-    pieces = [piece("a", half), piece("b", mirrored), piece("q", right)]
+    pieces = [polygon("a", half), polygon("b", mirrored), polygon("q", right)]
     # `half`: e0 hem, e1 side, e2 armhole, e3 shoulder, e4 neck, e5 front; mirrored: e0 neck, e1 shoulder, e2 armhole, e3 side, e4 hem.
-    seams = [joined("a.e1", "q.e7"), joined("a.e3", "q.e5"), joined("b.e3", "q.e1"), joined("b.e1", "q.e3")]
+    seams = [sewn("a.e1", "q.e7"), sewn("a.e3", "q.e5"), sewn("b.e3", "q.e1"), sewn("b.e1", "q.e3")]
     with pytest.raises(
         InputError, match=r"slides off: its front is open, by a border of \d\.\d\d m; close it by a seam"
     ):
         lay(pieces, seams)
     with pytest.raises(InputError, match="has a single opening"):
-        lay([piece("a", SLEEVE), piece("b", SLEEVE)], [joined("a.e2", "b.e0")])
+        lay([polygon("a", SLEEVE), polygon("b", SLEEVE)], [sewn("a.e2", "b.e0")])

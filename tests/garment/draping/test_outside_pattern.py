@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from bodies import body_of_size
 from devices import DEVICE
+from plain_patterns import sewn
 
 import warpflat
 from warpflat.app.scene.outside_pattern import OutsideJob
@@ -39,12 +40,7 @@ def polygon(name: str, corners: list[tuple[float, float]], **more: object) -> Pi
 
 
 def seam(name: str, first: str, second: str, ease: float = 0.0) -> Seam:
-    """Sides "piece.edge + piece.edge"; the second runs against its edges."""
-    sides = [
-        tuple(SeamSide(piece=p, edge=e, reversed=k == 1) for p, e in (word.split(".") for word in text.split(" + ")))
-        for k, text in enumerate((first, second))
-    ]
-    return Seam(name=name, sides=(sides[0], sides[1]), ease=ease)
+    return sewn(first, second, name, ease=ease)
 
 
 def tube(width: float, height: float, **more: object) -> Pattern:

@@ -9,6 +9,7 @@ import pytest
 from bodies import body_of_size
 from cloths import cylinder_body, grid, sheet
 from devices import DEVICE
+from plain_patterns import ARMHOLE, top
 
 import warpflat
 from warpflat.core.errors import InputError
@@ -21,36 +22,13 @@ from warpflat.garment.draping.openings import find_openings
 from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.sew_around import sew_around, stretches
 from warpflat.garment.draping.thin_body import ThinBody, draw_out_limbs
-from warpflat.pattern.drafting.piece_parts import Edge
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
-
-# Corners of half a top, counter-clockwise from the hem's left end: sides, armholes, shoulders and the neck between these.
-TOP = [(0.0, 0.0), (0.5, 0.0), (0.5, 0.35), (0.43, 0.56), (0.34, 0.58), (0.16, 0.58), (0.07, 0.56), (0.0, 0.35)]
-ARMHOLE = 2.0 * float(np.hypot(0.07, 0.21))
-
-
-def piece(name: str, corners: list[tuple[float, float]]) -> Piece:
-    ring = np.array([*corners, corners[0]])
-    return Piece(name=name, edges=[Edge(name=f"e{k}", points=ring[k : k + 2]) for k in range(len(corners))])
-
-
-def joined(first: str, second: str) -> Seam:
-    """Sides "piece.edge + piece.edge"; the second runs against its edges."""
-    sides = [
-        tuple(SeamSide(piece=p, edge=e, reversed=k == 1) for p, e in (word.split(".") for word in text.split(" + ")))
-        for k, text in enumerate((first, second))
-    ]
-    return Seam(name=f"{first} {second}", sides=(sides[0], sides[1]))
+from warpflat.pattern.drafting.pieces import Pattern
 
 
 def shirt() -> Pattern:
     """A top of two equal pieces, of which one is said to lie in front, and two sleeves; one sleeve is drawn upside down."""
-    sleeve = [(0.0, 0.0), (ARMHOLE, 0.0), (ARMHOLE, 0.25), (0.0, 0.25)]
-    pieces = [replace(piece("p", TOP), at="front"), piece("q", TOP), piece("l", sleeve), piece("r", sleeve)]
-    seams = [joined(f"p.e{k}", f"q.e{8 - k}") for k in (1, 3, 5, 7)]
-    seams += [joined("l.e1", "l.e3"), joined("r.e1", "r.e3")]
-    seams += [joined("p.e2 + q.e6", "l.e2"), joined("q.e2 + p.e6", "r.e0")]
-    return Pattern(name="shirt", pieces={"": pieces}, seams=seams)
+    (front, *others), seams = top()
+    return Pattern(name="shirt", pieces={"": [replace(front, at="front"), *others]}, seams=seams)
 
 
 def test_limbs_run_on_and_a_thin_body_grows():

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 from scans import needs_bodies, scan, triangles_of
 
-from warpflat.app.scene.body_waist import waist_of_body
+from warpflat.app.scene.found_seams import waist_of_body
 
 
 @needs_bodies

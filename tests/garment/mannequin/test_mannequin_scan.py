@@ -14,6 +14,7 @@ from body_copies import copy_of_body
 from body_tapes import armpit_and_crotch, tapes
 from landmarks import Landmarks
 from limb_tapes import arm_tapes, head_tape, leg_tapes
+from obj_files import write_obj
 from scans import needs_bodies, posed_body, posed_scan, scan, scanned_body, triangles_of
 from scipy.spatial import ConvexHull, cKDTree
 from self_intersections import self_intersections
@@ -356,10 +357,7 @@ def test_scan_with_a_vertex_far_off_names_it(tmp_path: Path) -> None:
     points, faces = _joined([_box((0.4, 1.8, 0.3), (0.0, 0.9, 0.0))])
     points = points.copy()
     points[5, 0] = 999999999.0
-    file = tmp_path / "body.obj"
-    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
-    rows += ["f " + " ".join(str(i + 1) for i in face) for face in faces.tolist()]
-    file.write_text("\n".join(rows) + "\n")
+    file = write_obj(tmp_path / "body.obj", (points, faces), digits="")
     words = r"body\.obj: scan: vertex 5 \(counted from 0\) lies at \(999999999, .*far from all others; move it"
     with pytest.raises(InputError, match=words):
         mannequin_from_scan_file(file, options=ScanOptions(), resolution_mm=20.0)

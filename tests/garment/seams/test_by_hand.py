@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import seam_solids as solids
 import trimesh
+from obj_files import write_obj
 
 import warpflat
 from warpflat.app.cli.main import main
@@ -215,7 +216,7 @@ def test_a_waist_is_made_where_the_body_has_it() -> None:
 
 
 def test_a_body_that_is_none_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    mesh = write(skirt(), tmp_path / "skirt.obj")
+    mesh = write_obj(tmp_path / "skirt.obj", skirt())
     for body, words in ((tmp_path / "body.obj", "--body: "), (mesh, "skirt.obj: scan: ")):
         command = ["flatten", str(mesh), "--units", "m", "--seams", "auto", "--body", str(body)]
         assert main([*command, "--out", str(tmp_path / "out")]) == 2
@@ -269,15 +270,8 @@ def test_what_no_cut_opens_is_refused() -> None:
         cut(handle, keep=("waist",))
 
 
-def write(surface: Surface, path: Path, *more: str) -> Path:
-    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in surface.vertices.tolist()]
-    lines += ["f " + " ".join(str(v + 1) for v in face if v >= 0) for face in surface.faces.tolist()]
-    path.write_text("\n".join([*lines, *more, ""]), encoding="utf-8")
-    return path
-
-
 def test_the_two_sides_of_every_cut_are_equally_long_in_the_pattern(tmp_path: Path) -> None:
-    mesh = write(trousers(), tmp_path / "trousers.obj")
+    mesh = write_obj(tmp_path / "trousers.obj", trousers())
     arguments = [
         "flatten",
         str(mesh),
@@ -305,7 +299,7 @@ def test_the_two_sides_of_every_cut_are_equally_long_in_the_pattern(tmp_path: Pa
 def test_marked_edges_lines_and_files_of_edges_are_cut(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     column = [row * 40 + 3 for row in range(16)]
     element = "l " + " ".join(str(vertex + 1) for vertex in column)
-    mesh = write(skirt(), tmp_path / "skirt.obj", "g gore", element)
+    mesh = write_obj(tmp_path / "skirt.obj", skirt(), more=("g gore", element))
     (mark,) = read_garment(mesh, units="m").marks
     assert (mark.name, mark.edges) == ("gore", (tuple(column),))
     (tmp_path / "rows.txt").write_text("# the side\n" + " ".join(map(str, column)) + "\n", encoding="utf-8")
@@ -351,7 +345,7 @@ def test_marked_edges_lines_and_files_of_edges_are_cut(tmp_path: Path, capsys: p
 def test_the_command_refuses_what_is_no_seam(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], way: str, words: str
 ) -> None:
-    mesh = write(skirt(), tmp_path / "skirt.obj")
+    mesh = write_obj(tmp_path / "skirt.obj", skirt())
     assert main(["flatten", str(mesh), "--units", "m", "--cut-seam", way, "--out", str(tmp_path / "out")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert words in line

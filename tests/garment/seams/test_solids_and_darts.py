@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import seam_solids as solids
 import trimesh
+from obj_files import write_obj
 
 import warpflat
 from warpflat.app.scene.found_seams import plain_panel, seams_entry
@@ -123,9 +124,7 @@ def test_a_poncho_is_a_garment_and_neither_a_flat_ring_nor_a_tube_is(tmp_path: P
     for slope, whole in ((0.0, False), (0.6, True), (6.0, False)):
         rings = [[r * np.cos(a), -slope * r, r * np.sin(a)] for r in np.linspace(0.1, 0.5, 8) for a in turn]
         faces = [[a, a + 60, b + 60, b] for k in range(0, 420, 60) for a, b in zip(around + k, after + k, strict=True)]
-        lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in rings]
-        lines += ["f " + " ".join(str(v + 1) for v in face) for face in faces]
-        (tmp_path / "ring.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        write_obj(tmp_path / "ring.obj", (rings, faces))
         (tmp_path / "ring.toml").write_text('[surface]\nfile = "ring.obj"\nunits = "m"\n', encoding="utf-8")
         assert (plain_panel(load_scene(tmp_path / "ring.toml")) is None) == whole
 
@@ -328,13 +327,6 @@ def test_a_piece_within_the_limit_gets_its_darts_while_the_whole_is_beyond() -> 
     assert any(name.startswith("dart") for piece in found.pieces for name in piece.lines if piece.name == "back")
 
 
-def write(surface: Surface, path: Path) -> Path:
-    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in surface.vertices.tolist()]
-    lines += ["f " + " ".join(str(v + 1) for v in face if v >= 0) for face in surface.faces.tolist()]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path
-
-
 def test_trousers_as_tight_as_a_skin_have_darts_and_no_panel_more() -> None:
     """Cloth that shears lies around a calf and a knee: panels were needed where the threads were strained instead."""
     plain = solids.trousers(0.04)
@@ -356,17 +348,8 @@ def test_trousers_as_tight_as_a_skin_have_darts_and_no_panel_more() -> None:
 
 def test_two_layers_are_worn_the_same_way_up(tmp_path: Path) -> None:
     shirt, skirt = solids.shirt(step=0.045), solids.skirt()
-    lines = []
-    count = 0
-    for surface in (shirt, skirt):
-        lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in surface.vertices.tolist()]
-        lines += ["f " + " ".join(str(v + 1 + count) for v in face if v >= 0) for face in surface.faces.tolist()]
-        count += len(surface.vertices)
-    button = trimesh.creation.icosphere(1, radius=0.005)
-    lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in button.vertices.tolist()]
-    lines += ["f " + " ".join(str(v + 1 + count) for v in face) for face in button.faces.tolist()]
-    (tmp_path / "two.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    layers = warpflat.read_layers(tmp_path / "two.obj", units="m")
+    path = write_obj(tmp_path / "two.obj", shirt, skirt, trimesh.creation.icosphere(1, radius=0.005))
+    layers = warpflat.read_layers(path, units="m")
     assert len(layers) == 2
     assert any("small part" in note for note in layers[0].notes)
     found = warpflat.find_seams(layers)
@@ -381,13 +364,7 @@ def test_the_body_that_wears_a_shirt_is_no_layer_of_it(tmp_path: Path) -> None:
     trunk = solids.rod([0, -0.3, 0], [0, 0.6, 0], 0.15, 0.6)
     arms = [solids.rod([0, 0.5, 0], [0.6 * side, 0.5, 0], 0.045) for side in (1.0, -1.0)]
     body = solids.skin(solids.joined([trunk, *arms], 0.02), [-0.8, -0.5, -0.3], [0.8, 0.9, 0.3], 0.045)
-    lines, count = list[str](), 0
-    for surface in (body, shirt):
-        lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in surface.vertices.tolist()]
-        lines += ["f " + " ".join(str(v + 1 + count) for v in face if v >= 0) for face in surface.faces.tolist()]
-        count += len(surface.vertices)
-    (tmp_path / "worn.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    layers = warpflat.read_layers(tmp_path / "worn.obj", units="m")
+    layers = warpflat.read_layers(write_obj(tmp_path / "worn.obj", body, shirt), units="m")
     assert [len(layer.vertices) for layer in layers] == [len(shirt.vertices)]
     assert any(note.startswith("a body, ") for note in layers[0].notes)
 

@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import seam_solids as solids
+from obj_files import write_obj
 
 import warpflat
 from warpflat.app.cli.main import main
 from warpflat.app.scene.found_seams import found_seams
 from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.mirror import mirror_images
+from warpflat.garment.construction.mirror import mirror_images
 from warpflat.garment.seams.anatomy import find_anatomy
 from warpflat.garment.seams.fields import Operators
 from warpflat.garment.seams.find import FoundSeams, cloth_of
@@ -174,11 +175,7 @@ def test_eased_seams_are_as_long_as_each_other_and_cost_less() -> None:
 
 
 def test_the_command_parts_a_garment_sews_it_and_draws_mirrored_pieces_once(tmp_path: Path) -> None:
-    surface = solids.shirt(step=0.045)
-    mesh = tmp_path / "shirt.obj"
-    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in surface.vertices.tolist()]
-    lines += ["f " + " ".join(str(v + 1) for v in face if v >= 0) for face in surface.faces.tolist()]
-    mesh.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    mesh = write_obj(tmp_path / "shirt.obj", solids.shirt(step=0.045))
     arguments = ["flatten", str(mesh), "--units", "m", "--fabric", "woven", "--no-picture", "--frames", "0"]
     assert main([*arguments, "--limit", "1", "--out", str(tmp_path / "out")]) == 0
     pattern = warpflat.read_pattern_json(tmp_path / "out" / "pattern.json")

@@ -480,10 +480,11 @@ def test_a_label_beside_a_piece_has_its_room_on_the_sheet_and_stands_beside_all_
     edges = [Edge(name=e.name, points=e.points * [1.1, 1]) for e in small.edges]
     wide = square("frame", "40", edges=edges, holes=small.holes)
     drafted = draft_garment(Pattern(name="frames", pieces={"40": [wide], "38": [small]}, seams=[]))
-    (placed,) = lay_out(nests(drafted), width=1.0).placed
+    sheet = lay_out(nests(drafted), width=1.0)
+    (placed,) = sheet.placed
     label = nest_label(placed.pieces)
     assert all(not shapely.Polygon(p.cut_line).intersects(shapely.Polygon(label.box)) for p in placed.pieces)
-    assert shapely.box(*placed.box.reshape(-1)).buffer(1e-9).covers(shapely.Polygon(label.box + placed.offset))
+    assert shapely.box(0.0, 0.0, *sheet.size).buffer(1e-9).covers(shapely.Polygon(label.box + placed.offset))
 
 
 @pytest.mark.parametrize(

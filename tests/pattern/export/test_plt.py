@@ -96,7 +96,8 @@ def test_what_a_plotter_draws_is_the_pattern(tmp_path: Path):
         assert min(abs(length - edge.length) for length in lengths) < 1e-4
     texts = [text for text, _ in found.words[3]]
     assert "ARMEL" in texts
-    assert all(placed.box[0][0] < x < placed.box[1][0] for _, (x, _) in found.words[3])
+    (low, _), (high, _) = (limit(placed.on_sheet(piece.cut_line), axis=0) for limit in (np.min, np.max))
+    assert all(low < x < high for _, (x, _) in found.words[3])
 
 
 def test_sizes_lie_upon_each_other_or_one_is_chosen(command: Command):

@@ -7,7 +7,6 @@ import hashlib
 import itertools
 import json
 import math
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ from pydantic import Field, model_validator
 
 from warpflat._version import __version__
 from warpflat.app.scene.load import Scene, errors_named, expand_variables, make_scene
-from warpflat.core import InputError, Table, check_table, file_digest, plain_letters, quote_value, read_toml
+from warpflat.core import InputError, Table, check_table, file_digest, quote_value, read_toml, with_plain_letters
 from warpflat.garment import MannequinTable
 
 __all__ = ["BatchTable", "BodyTable", "Task", "TaskTable", "load_batch"]
@@ -202,7 +201,7 @@ def _make_task(
         fabric = settings.fabric if isinstance(settings.fabric, str) else "own"
         # Who looks into the folder finds a task by its words; the digits tell apart what they leave out.
         words = "-".join(filter(None, (scene.name, label, fabric)))
-        plain = re.sub(r"[^A-Za-z0-9_.-]+", "_", plain_letters(words))[:_KEY_LETTERS].strip("_.-")
+        plain = with_plain_letters(words)[:_KEY_LETTERS].strip("_.-")
         return Task(
             key=f"{plain}-{hashlib.sha256(text.encode()).hexdigest()[:_KEY_DIGITS]}",
             name=name,

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import sys
 import time
+from collections import Counter
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import click
 
-from warpflat.app.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, ComputingCommand
+from warpflat.app.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, ComputingCommand, tell
 
 __all__ = ["batch"]
 
@@ -61,7 +62,7 @@ def batch(file: Path, out: Path | None, workers: int, scheduler: str | None, qui
         if scheduler is not None:
             raise InputError('--scheduler needs Dask: pip install ".[batch]" in a checkout, or leave it out')
         if workers > 1:
-            _note('--workers needs Dask (pip install ".[batch]" in a checkout); the tasks run one after the other')
+            tell('note: --workers needs Dask (pip install ".[batch]" in a checkout); the tasks run one after the other')
             workers = 1
     start_warp_silently()
     folder = out if out is not None else Path("out") / file.stem
@@ -76,20 +77,14 @@ def batch(file: Path, out: Path | None, workers: int, scheduler: str | None, qui
         )
     failed = [row for row in rows if row.message]
     for row in failed[:_MOST_ERRORS]:
-        click.echo(f"warpflat: {one_line(f'{row.task.key}: {row.message}')}", err=True)
+        tell(one_line(f"{row.task.key}: {row.message}"))
     if len(failed) > _MOST_ERRORS:
-        click.echo(f"warpflat: {len(failed) - _MOST_ERRORS} more errors; see {folder / 'index.html'}", err=True)
-    counts: dict[str, int] = {}
-    for row in rows:
-        counts[row.status] = counts.get(row.status, 0) + 1
+        tell(f"{len(failed) - _MOST_ERRORS} more errors; see {folder / 'index.html'}")
+    counts = Counter(row.status for row in rows)
     if not quiet:
         totals = ", ".join(f"{count} {status}" for status, count in counts.items())
         click.echo(f"{len(rows)} tasks: {totals}; see {folder / 'index.html'}")
     return NOT_CONVERGED if failed or NOT_AT_REST in counts else DONE
-
-
-def _note(text: str) -> None:
-    click.echo(f"warpflat: note: {text}", err=True)
 
 
 class _Bar:
@@ -133,4 +128,4 @@ class _Bar:
         """Print a note above the bar."""
         if self._bar is not None:
             self._bar.clear()
-        _note(text)
+        tell(f"note: {text}")

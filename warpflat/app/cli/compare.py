@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from warpflat.app.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, ComputingCommand, output_options
+from warpflat.app.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, ComputingCommand, Output, output_options, tell
 from warpflat.app.cli.run import start_warp_silently
 
 __all__ = ["compare"]
@@ -27,15 +27,7 @@ What comes out, in DIR:
 )
 @click.option("--drape", is_flag=True, help="Sew each of them and put it on its body: gap, strain and pressure, too.")
 @output_options(folder="out/NAME-compared", printed="compare.json", verbose=False)
-def compare(
-    scene: Path,
-    fabrics: tuple[str, ...],
-    out: Path | None,
-    quiet: bool,
-    as_json: bool,
-    device: str | None,
-    drape: bool,
-) -> int:
+def compare(scene: Path, fabrics: tuple[str, ...], drape: bool, output: Output) -> int:
     """Run a scene in several fabrics and lay the outlines upon each other: table, compare.png, compare.svg, compare.json.
 
     Cuts, seams and constraints are the scene's in each of them; cuts found automatically are found once and all made.
@@ -53,13 +45,14 @@ def compare(
 
     job = load_scene(scene)
     start_warp_silently()
-    target = out if out is not None else Path("out") / f"{job.name}-compared"
     with (
-        ProgressBar(job.name, hidden=quiet or as_json) as bar,
-        output_folder(target, compared_files(drape=drape), sources=job.sources, guard=True) as folder,
+        ProgressBar(job.name, hidden=not output.tells) as bar,
+        output_folder(
+            output.folder(f"{job.name}-compared"), compared_files(drape=drape), sources=job.sources, guard=True
+        ) as folder,
     ):
         comparison = compare_fabrics(
-            job, fabrics, on_progress=lambda _, progress: bar(progress), device=device, drape=drape
+            job, fabrics, on_progress=lambda _, progress: bar(progress), device=output.device, drape=drape
         )
         files = save_comparison(comparison, folder)
     warnings = [
@@ -74,10 +67,6 @@ def compare(
         )
     ]
     for warning in warnings:
-        click.echo(f"warpflat: {warning}", err=True)
-    if as_json:
-        click.echo((folder / "compare.json").read_text(encoding="utf-8"), nl=False)
-    elif not quiet:
-        click.echo(comparison_table(comparison))
-        click.echo(f"{folder}: {', '.join(files)}")
+        tell(warning)
+    output.report(folder / "compare.json", lambda: [comparison_table(comparison), f"{folder}: {', '.join(files)}"])
     return NOT_CONVERGED if warnings else DONE

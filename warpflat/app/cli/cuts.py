@@ -8,7 +8,7 @@ from typing import Literal
 
 import click
 
-from warpflat.app.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, ComputingCommand, output_options
+from warpflat.app.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, ComputingCommand, Output, output_options, tell
 from warpflat.app.cli.run import report_run, start_warp_silently
 from warpflat.core import InputError
 
@@ -34,11 +34,7 @@ __all__ = ["cuts"]
 @output_options(printed="ledger.json, with --apply metrics.json,")
 def cuts(
     scene: Path,
-    out: Path | None,
-    quiet: bool,
-    verbose: bool,
-    as_json: bool,
-    device: str | None,
+    output: Output,
     apply: int | None,
     by: Literal["per_cm", "released"],
     rotate: tuple[str, str] | None,
@@ -67,7 +63,7 @@ def cuts(
 
     loaded = load_scene(scene)
     start_warp_silently()
-    target = out if out is not None else Path("out") / loaded.name
+    target = output.folder(loaded.name)
     edits = [(how, edit) for how, edit in (("rotate", rotate), ("split", split), ("turn", turn)) if edit]
     if edits:
         # Edit a dart, and compare the garment before and after.
@@ -83,22 +79,22 @@ def cuts(
         if loaded.settings.mannequin is None:
             raise InputError(f"{loaded.where}: --{how} edits the darts of a form; on a [surface] edit [[cuts]]")
         with output_folder(target, ["edit.json", "cuts.toml"], sources=loaded.sources, guard=True) as folder:
-            made = edit_dart(loaded, dart, how=how, aim=aim, at=at, device=device)
+            made = edit_dart(loaded, dart, how=how, aim=aim, at=at, device=output.device)
             data = made.as_dict()
             _write_toml(folder, "The scene's cuts and seams after the edit, instead of its own.", [made.as_toml()])
             write_report(folder / "edit.json", data, name="edit", files=["cuts.toml"])
-        if as_json:
-            click.echo((folder / "edit.json").read_text(encoding="utf-8"), nl=False)
-        elif not quiet:
-            click.echo(f"{edit_table(data)}\n\n{made.as_toml()}\n{folder}: edit.json, cuts.toml")
+        output.report(
+            folder / "edit.json", lambda: [f"{edit_table(data)}\n\n{made.as_toml()}\n{folder}: edit.json, cuts.toml"]
+        )
         return DONE if data["after"]["converged"] else NOT_CONVERGED
     if at is not None:
         raise InputError("--at belongs to --rotate and --split")
     from warpflat.app.cli.progress_bar import ProgressBar
     from warpflat.app.cli.tables import ledger_table
+    from warpflat.app.scene.as_toml import tables_as_toml
     from warpflat.app.scene.ledger import cuts_of_entry, scene_ledger, with_cut
     from warpflat.app.scene.run import files_of_run, run_scene
-    from warpflat.core import optional_file, output_folder, tables_as_toml, write_report
+    from warpflat.core import optional_file, output_folder, write_report
     from warpflat.pattern import write_ledger_picture
 
     on_form = loaded.settings.mannequin is not None
@@ -106,10 +102,10 @@ def cuts(
     expected += files_of_run(loaded) if apply is not None else []
     result, written = None, list[str]()
     with (
-        ProgressBar(loaded.name, hidden=quiet or as_json) as bar,
+        ProgressBar(loaded.name, hidden=not output.tells) as bar,
         output_folder(target, expected, sources=loaded.sources, guard=True) as folder,
     ):
-        ledger = scene_ledger(loaded, by=by, device=device)
+        ledger = scene_ledger(loaded, by=by, device=output.device)
         chosen = None if apply is None else ledger.entry(apply)
         with optional_file(folder / "ledger.png", written) as path:
             write_ledger_picture(path, ledger)
@@ -119,16 +115,17 @@ def cuts(
             written.append("cuts.toml")
         write_report(folder / "ledger.json", ledger.as_dict(), name="ledger", files=written)
         if chosen is not None and chosen.cut:
-            result = run_scene(with_cut(loaded, chosen.cut), folder, on_progress=bar, device=device)
+            result = run_scene(with_cut(loaded, chosen.cut), folder, on_progress=bar, device=output.device)
         elif apply is not None:
-            result = run_scene(loaded, folder, on_progress=bar, device=device, cuts=cuts_of_entry(ledger, apply))
-    if as_json and result is None:
-        click.echo((folder / "ledger.json").read_text(encoding="utf-8"), nl=False)
-    elif not (quiet or as_json):
-        for note in ledger.notes:
-            click.echo(f"warpflat: note: {note}", err=True)
-        click.echo(f"{ledger_table(ledger)}\n{folder}: {', '.join(['ledger.json', *written])}")
-    return DONE if result is None else report_run(result, folder, quiet=quiet, verbose=verbose, as_json=as_json)
+            result = run_scene(loaded, folder, on_progress=bar, device=output.device, cuts=cuts_of_entry(ledger, apply))
+    for note in ledger.notes if output.tells else ():
+        tell(f"note: {note}")
+    if result is None or output.tells:
+        output.report(
+            folder / "ledger.json",
+            lambda: [f"{ledger_table(ledger)}\n{folder}: {', '.join(['ledger.json', *written])}"],
+        )
+    return DONE if result is None else report_run(result, folder, output)
 
 
 def _write_toml(folder: Path, heading: str, tables: Sequence[str]) -> None:

@@ -12,8 +12,10 @@ from warpflat.app.cli.options import (
     NOT_CONVERGED,
     RUN_FILES,
     ComputingCommand,
+    Output,
     output_options,
-    shear_limit_option,
+    scene_option,
+    tell,
 )
 from warpflat.app.cli.run import run_and_report, start_warp_silently
 
@@ -29,7 +31,7 @@ Of a pattern the last two and metrics.json come out alone."""
 @click.argument("scene", metavar="SCENE|DIR|PATTERN", type=click.Path(path_type=Path))
 @click.option("--body", metavar="SIZE|SCAN", help='Of a pattern: a size, such as "EU 38", or a scan\'s file.')
 @click.option("--fabric", metavar="NAME", help="Of a pattern.  [default: its own, or woven]")
-@shear_limit_option
+@scene_option("shear_limit")
 @click.option("--seams", type=click.Path(path_type=Path), metavar="FILE", help="Of a pattern: TOML with its [[seams]].")
 @click.option("--units", metavar="UNIT", help="Of a mesh whose texture is its sewn pattern, unless the file says.")
 @click.option("--size", metavar="SIZE", help="Of a graded pattern.  [default: its sample size]")
@@ -45,11 +47,7 @@ Of a pattern the last two and metrics.json come out alone."""
 @output_options()
 def drape(
     scene: Path,
-    out: Path | None,
-    quiet: bool,
-    verbose: bool,
-    as_json: bool,
-    device: str | None,
+    output: Output,
     body: str | None,
     fabric: str | None,
     shear_limit: float | None,
@@ -89,48 +87,39 @@ def drape(
         if edges:
             lines, notes = edge_table(scene, sewing=seams, units=units)
             for note in notes:
-                click.echo(f"warpflat: {note}", err=True)
+                tell(note)
             click.echo("\n".join(lines))
             return DONE
         start_warp_silently()
         job = OutsideJob.read(scene, sewing=seams, body=body, units=units)
-        folder = out if out is not None else Path("out") / f"{job.name}-draped"
+        folder = output.folder(f"{job.name}-draped")
         result = drape_outside(
-            job, folder, fabric=fabric, shear_limit=shear_limit, size=size, device=device, usd=usd, correct=correct
-        )
+            job, folder, fabric=fabric, shear_limit=shear_limit, size=size, device=output.device, usd=usd,
+            correct=correct,
+        )  # fmt: skip
         warnings = warnings_of(result.metrics)
         # What was left out has a line of its own at the end.
         left = [note for note in result.notes if note not in result.metrics.get("notes", ())]
-        for line in (*([] if quiet or as_json else left), *warnings):
-            click.echo(f"warpflat: {line}", err=True)
-        if as_json:
-            click.echo((folder / "metrics.json").read_text(encoding="utf-8"), nl=False)
-        elif not quiet:
-            for line in summary_lines(result.metrics, result.files, str(folder)):
-                click.echo(line)
-            for line in drape_lines(result.metrics) if verbose else ():
-                click.echo(line)
+        for line in (*(left if output.tells else ()), *warnings):
+            tell(line)
+        output.report(
+            folder / "metrics.json",
+            lambda: [
+                *summary_lines(result.metrics, result.files, str(folder)),
+                *(drape_lines(result.metrics) if output.verbose else ()),
+            ],
+        )
         return NOT_CONVERGED if warnings else DONE
-    options = {
-        "--units": units,
-        "--body": body,
-        "--fabric": fabric,
-        "--seams": seams,
-        "--size": size,
-        "--edges": edges or None,
-    }
-    for option, value in options.items():
+    of_pattern = {"units": units, "body": body, "fabric": fabric, "seams": seams, "size": size, "edges": edges or None}
+    for option, value in of_pattern.items():
         if value is not None:
             raise InputError(
-                f"{option}: is for a pattern's file or a run's folder; {scene} is a scene, which says it itself"
+                f"--{option}: is for a pattern's file or a run's folder; {scene} is a scene, which says it itself"
             )
     loaded = load_scene(scene).allowing(shear_limit)
     if loaded.settings.half:
         raise InputError(f"{scene}: half: a drape needs the whole garment; leave out half = true")
-    table = loaded.settings.drape or DrapeTable()
-    if correct:
-        table = table.model_copy(update={"correct": True})
-    if usd:
-        table = table.model_copy(update={"usd": True})
+    asked = {key: True for key, wanted in (("correct", correct), ("usd", usd)) if wanted}
+    table = (loaded.settings.drape or DrapeTable()).model_copy(update=asked)
     loaded = replace(loaded, settings=loaded.settings.model_copy(update={"drape": table}))
-    return run_and_report(loaded, out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)
+    return run_and_report(loaded, output)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from warpflat.app.cli.options import DONE, ComputingCommand
+from warpflat.app.cli.options import DONE, ComputingCommand, tell
 
 __all__ = ["export"]
 
@@ -89,6 +89,6 @@ def export(
     )
     if not quiet:
         for note in notes:
-            click.echo(f"warpflat: {note}", err=True)
+            tell(note)
         click.echo(f"{files[0].parent}: {', '.join(file.name for file in files)}")
     return DONE

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +13,14 @@ from warpflat.app.cli.options import (
     EXIT_CODES,
     RUN_FILES,
     ComputingCommand,
-    fabric_file_option,
+    Output,
     output_options,
-    shear_limit_option,
+    scene_option,
+    scene_options,
+    tell,
 )
 from warpflat.app.cli.run import report_run, start_warp_silently
-from warpflat.core import InputError, make_file_name, plain_letters, quote_value
+from warpflat.core import InputError, make_file_name, quote_value, refuse_to_replace_others, with_plain_letters
 
 __all__ = ["fit"]
 
@@ -59,24 +61,19 @@ _FILES = """\b
     is_flag=True,
     help="End on the other body as its scan is posed, on a chair or a saddle.  [default: as the first body stands]",
 )
-@click.option("--units", metavar="UNIT", help="Of the garment's file: m, cm, mm, in ... Needed unless it says (USD).")
-@click.option("--prim", metavar="PATH", help="Which mesh of a USD file.  [default: all]")
-@click.option("--front", metavar="AXIS", help="Where its front faces: +z, -z, +x, -x.  [default: found]")
-@click.option("--seams", metavar="HOW", help="As for warpflat flatten.")
-@click.option(
-    "--cut-seam",
-    "cut_seams",
-    multiple=True,
-    metavar="[NAME=]WAY",
+@scene_option("surface.units", help="Of the garment's file: m, cm, mm, in ... Needed unless it says (USD).")
+@scene_option("surface.prim", help="Which mesh of a USD file.  [default: all]")
+@scene_option("find_seams.front", help="Where its front faces: +z, -z, +x, -x.  [default: found]")
+@scene_option("find_seams.find", help="As for warpflat flatten.")
+@scene_option(
+    "seams_cut",
     help="A seam that you draw on the garment as its file has it, with points:, line: or plane: as for warpflat flatten; it is carried "
     "with the cloth.",
 )
-@click.option("--fabric", metavar="NAME", help="A fabric of the library; warpflat fabrics lists them.")
-@fabric_file_option
-@shear_limit_option
-@click.option("--bands", metavar="HOW", help="As for warpflat flatten.")
-@click.option("--name", metavar="NAME", help="Name of the files.  [default: the garment's]")
-@click.option("--frames", type=int, metavar="N", help="About how many frames, 0 for none.  [default: 60]")
+@scene_options("fabric", "shear_limit")
+@scene_option("bands", help="As for warpflat flatten.")
+@scene_option("name", help="Name of the files.  [default: the garment's]")
+@scene_option("output.frames")
 @click.option("--no-picture", is_flag=True, help="Write no picture.png.")
 @output_options(folder="out/NAME-fitted", printed="fit.json")
 def fit(
@@ -84,11 +81,7 @@ def fit(
     body: str | None,
     bodies: tuple[str, ...],
     eases: tuple[str, ...],
-    out: Path | None,
-    quiet: bool,
-    verbose: bool,
-    as_json: bool,
-    device: str | None,
+    output: Output,
     **options: Any,
 ) -> int:
     """Carry a garment from its body to another one, keep its ease, and flatten it.
@@ -109,12 +102,12 @@ def fit(
     from warpflat.app.cli.flatten import drawn_seam
     from warpflat.app.cli.progress_bar import ProgressBar
     from warpflat.app.scene.fit import (
+        STUDY_FILES,
         FitJob,
         Fitted,
         check_tables,
         ease_wishes,
         fit_to,
-        require_own_study,
         study_table,
         write_study,
     )
@@ -123,52 +116,50 @@ def fit(
     ease = ease_wishes(eases)
     if len(set(bodies)) < len(bodies):
         raise InputError(f"--to: {next(b for b in bodies if bodies.count(b) > 1)!r} is given twice; give it once")
-    name = re.sub(r"[^A-Za-z0-9_.-]+", "_", plain_letters(options["name"] or garment.stem)).strip("_.-") or "garment"
-    folder = out if out is not None else Path("out") / f"{name}-fitted"
-    cuts = [drawn_seam(text) for text in options["cut_seams"]]
-    for text, cut in zip(options["cut_seams"], cuts, strict=True):
+    name = with_plain_letters(options["name"] or garment.stem) or "garment"
+    folder, drawn = output.folder(f"{name}-fitted"), options["cut_seam"]
+    cuts = [drawn_seam(text) for text in drawn]
+    for text, cut in zip(drawn, cuts, strict=True):
         if not cut.keys() & {"points", "plane"} and not isinstance(cut.get("line"), list):
             raise InputError(
                 f"--cut-seam {quote_value(text)}: what is carried is drawn by points:, line:X,Y,Z ... or plane:"
             )
     # The carried mesh is one of its own, with its unit.
     of_file = dict.fromkeys(("units", "prim", "name"))
-    tables = scene_tables({**options, **of_file, "cut_seam": tuple(cuts), "fabric_file": options["fabric_files"]})
+    tables = scene_tables({**options, **of_file, "cut_seam": tuple(cuts)})
     tables["output"] = {"picture": not options["no_picture"], **tables.get("output", {})}
-    check_tables(tables, garment, options["cut_seams"])
-    require_own_study(folder)
+    check_tables(tables, garment, drawn)
+    refuse_to_replace_others(folder, STUDY_FILES)
     start_warp_silently()
     job = FitJob.start(
         garment, units=options["units"], prim=options["prim"], name=name, front=options["front"], body=body
     )
     # Every body is built before the first pattern, so that a wrong one is refused at once.
     carried = [job.to(wearer, ease, keep_pose=options["keep_pose"]) for wearer in bodies]
-    shown = not (quiet or as_json)
     code, fitted = 0, []
     for one in carried:
         to = folder if len(bodies) == 1 else folder / make_file_name(one.body).replace(" ", "_")
-        with ProgressBar(name, hidden=not shown) as bar:
-            result = fit_to(job, one, tables, to, name=name, device=device, on_progress=bar)
+        with ProgressBar(name, hidden=not output.tells) as bar:
+            result = fit_to(job, one, tables, to, name=name, device=output.device, on_progress=bar)
         kept = (
             [f"its own pattern is kept, and graded by the growth of the cloth; {_ANEW}"]
             if job.keeps_pattern(tables)
             else []
         )
-        told = [*([*job.notes, *kept] if shown and one is carried[0] else ()), *one.notes]
+        told = [*([*job.notes, *kept] if output.tells and one is carried[0] else ()), *one.notes]
         for note in told:
-            click.echo(f"warpflat: note: {note}", err=True)
-        if len(bodies) > 1 and shown:
+            tell(f"note: {note}")
+        if len(bodies) > 1 and output.tells:
             click.echo(f"{one.body}:")
-        ended = report_run(result, to, quiet=quiet or as_json, verbose=verbose, as_json=False)
+        # Of JSON only that of all bodies is printed.
+        ended = report_run(result, to, replace(output, quiet=not output.tells, as_json=False))
         code = max(code, ended)
         fitted.append(Fitted(carried=one, folder=to, metrics=result.metrics, converged=ended == DONE))
-        if shown:
+        if output.tells:
             click.echo(fitted[-1].verdict())
     written = write_study(folder, fitted)
-    if as_json:
-        click.echo((folder / "fit.json").read_text(encoding="utf-8"), nl=False)
-    elif shown:
-        for line in study_table(fitted) if len(fitted) > 1 else ():
-            click.echo(line)
-        click.echo(f"fit: {folder}: {', '.join(written)}")
+    output.report(
+        folder / "fit.json",
+        lambda: [*([study_table(fitted)] if len(fitted) > 1 else ()), f"fit: {folder}: {', '.join(written)}"],
+    )
     return code

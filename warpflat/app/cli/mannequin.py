@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from warpflat.app.cli.options import DONE, ComputingCommand
+from warpflat.app.cli.options import DONE, ComputingCommand, tell
 from warpflat.app.cli.run import start_warp_silently
 from warpflat.core import InputError, require_memory_for_usd
 
@@ -96,7 +96,7 @@ def mannequin(
         click.echo(files["metrics"].read_text(encoding="utf-8"), nl=False)
     elif not quiet:
         for note in body.notes:
-            click.echo(f"warpflat: note: {note}", err=True)
+            tell(f"note: {note}")
         click.echo(mannequin_table(body.source, body.levels(), body.size_difference()))
         if (over := body.measure_difference()) is not None:
             click.echo(f"\n{measures_table(body.measures, over)}\n")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from warpflat.app.cli.options import DONE, NOT_CONVERGED, ComputingCommand
+from warpflat.app.cli.options import DONE, NOT_CONVERGED, ComputingCommand, tell
 
 __all__ = ["marker"]
 
@@ -144,6 +144,6 @@ def marker(
         click.echo(json.dumps({"schema": 1, "markers": plans}))
     elif not quiet:
         for note in notes:
-            click.echo(f"warpflat: {note}", err=True)
+            tell(note)
         click.echo(f"{files[0].parent}: {', '.join(file.name for file in files)}")
     return NOT_CONVERGED if any("not_made" in plan for plan in plans) else DONE

@@ -77,27 +77,7 @@ def new(
             raise InputError(f"a {offer.name} lies on no body; leave out --card")
         if out is not None or fabric is not None:
             raise InputError("--card draws a measurement card and writes no scene; leave out --out and --fabric")
-        from warpflat.app.scene.style import covered_bands
-        from warpflat.garment import needed_measurements, write_measurement_card
-
-        table = _body_table(size, measures, scan, card)
-        if card.exists() or card.is_symlink():
-            raise InputError(f"{card}: exists and is kept; name another file")
-        if card.suffix.lower() != ".png":
-            raise InputError(f"{card}: a card is a picture; name it *.png")
-        if "scan" in table:
-            raise InputError("--card is for a tape measure; a scan is measured by itself: leave out --scan")
-        wearer = check_table(MannequinTable, {**(table or {"size": "EU 38"}), "resolution_mm": 12.0}, "command line")
-        mannequin = mannequin_from_table(wearer, path_of=Path)
-        hood = any(wish["kind"] == "hood" for wish in tables.get("finishing", ()))
-        given = set(table.get("measurements", ()))
-        guessed = {note.split(" = ")[0] for note in mannequin.notes} - given
-        card.parent.mkdir(parents=True, exist_ok=True)
-        write_measurement_card(
-            card, mannequin, needed_measurements(covered_bands(tables), hood=hood),
-            title=f"What to measure: {offer.name.replace('_', ' ')}", values=mannequin.lengths if table else None, guessed=guessed,
-        )  # fmt: skip
-        click.echo(f"wrote {card}: what to measure for {offer.name.replace('_', ' ')}, and where")
+        _draw_card(card, offer.name.replace("_", " "), tables, _body_table(size, measures, scan, card))
         return DONE
     if size is None and not measures and scan is None and (offer.on_body or out is None):
         if offer.on_body and (chosen or fabric or out):
@@ -130,6 +110,35 @@ def new(
     _print_choices(offer, taken)
     click.echo(f"make its pattern with: warpflat run {file}")
     return DONE
+
+
+def _draw_card(card: Path, garment: str, tables: Mapping[str, Any], body: Mapping[str, Any]) -> None:
+    """Draw what to measure for a garment, on the body of a table, or on that of a size where it says nothing."""
+    from warpflat.app.scene.style import covered_bands
+    from warpflat.core import check_table
+    from warpflat.garment import (
+        MannequinTable,
+        mannequin_from_table,
+        needed_measurements,
+        write_measurement_card,
+    )
+
+    if card.exists() or card.is_symlink():
+        raise InputError(f"{card}: exists and is kept; name another file")
+    if card.suffix.lower() != ".png":
+        raise InputError(f"{card}: a card is a picture; name it *.png")
+    if "scan" in body:
+        raise InputError("--card is for a tape measure; a scan is measured by itself: leave out --scan")
+    wearer = check_table(MannequinTable, {**(body or {"size": "EU 38"}), "resolution_mm": 12.0}, "command line")
+    mannequin = mannequin_from_table(wearer, path_of=Path)
+    hood = any(wish["kind"] == "hood" for wish in tables.get("finishing", ()))
+    guessed = {note.split(" = ")[0] for note in mannequin.notes} - set(body.get("measurements", ()))
+    card.parent.mkdir(parents=True, exist_ok=True)
+    write_measurement_card(
+        card, mannequin, needed_measurements(covered_bands(tables), hood=hood), title=f"What to measure: {garment}",
+        values=mannequin.lengths if body else None, guessed=guessed,
+    )  # fmt: skip
+    click.echo(f"wrote {card}: what to measure for {garment}, and where")
 
 
 def _body_table(size: str | None, measures: tuple[str, ...], scan: Path | None, file: Path) -> dict[str, Any]:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import functools
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import click
 
-from warpflat.core import require_environment, require_memory_for_libraries
+from warpflat.app.cli.environment import require_environment
+from warpflat.app.scene.options import SCENE_OPTIONS
+from warpflat.core import require_memory_for_libraries
 
 __all__ = [
     "BAD_INPUT",
@@ -17,9 +21,11 @@ __all__ = [
     "NOT_CONVERGED",
     "RUN_FILES",
     "ComputingCommand",
-    "fabric_file_option",
+    "Output",
     "output_options",
-    "shear_limit_option",
+    "scene_option",
+    "scene_options",
+    "tell",
 ]
 
 
@@ -49,9 +55,7 @@ What comes out, in DIR:
   pattern.json  everything of the pattern; warpflat export makes the others from it"""
 
 
-_VERBOSE = click.option(
-    "--verbose", "-v", is_flag=True, help="Print the tables of pieces and seams, every note, and all advice on the fit."
-)
+Command = Callable[..., Any]
 
 
 def _check_shear_limit(_: click.Context, __: click.Parameter, value: float | None) -> float | None:
@@ -62,24 +66,24 @@ def _check_shear_limit(_: click.Context, __: click.Parameter, value: float | Non
     return value
 
 
-shear_limit_option = click.option(
-    "--shear-limit",
-    type=float,
-    metavar="DEGREES",
-    callback=_check_shear_limit,
-    help="How far warp and weft may be off the right angle; tailors trust 5 to 8.  [default: the fabric's]",
-)
-"""The option `--shear-limit` of commands that take a fabric."""
+def scene_option(key: str, *, help: str = "") -> Callable[[Command], Command]:
+    """Add the option of a command that sets a key of a scene; `help` replaces what it says of itself."""
+    option = SCENE_OPTIONS[key]
+    return click.option(
+        option.name,
+        type=option.kind if isinstance(option.kind, type) else click.Choice(option.kind),
+        metavar=option.declaration.partition(" ")[2] or None,
+        multiple=option.multiple,
+        callback=_check_shear_limit if key == "shear_limit" else None,
+        help=help or option.help,
+    )
 
 
-fabric_file_option = click.option(
-    "--fabric-file",
-    "fabric_files",
-    multiple=True,
-    metavar="FILE",
-    help="A fabric file of your own; its only fabric needs no --fabric.",
-)
-"""The option `--fabric-file` of commands that flatten a mesh."""
+def scene_options(first: str, last: str) -> Callable[[Command], Command]:
+    """Add the options of a command that set the keys of a scene from one to another, in the order of `SCENE_OPTIONS`."""
+    keys = list(SCENE_OPTIONS)
+    between = keys[keys.index(first) : keys.index(last) + 1]
+    return lambda command: functools.reduce(lambda made, key: scene_option(key)(made), reversed(between), command)
 
 
 class ComputingCommand(click.Command):
@@ -96,17 +100,56 @@ class ComputingCommand(click.Command):
         return super().invoke(ctx)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Output:
+    """Where a command writes, and how much it prints.
+
+    Attributes:
+        out: the folder that was asked for.
+        quiet, verbose, as_json: print less, more, or a file instead.
+        device: Warp device.
+    """
+
+    out: Path | None
+    quiet: bool
+    verbose: bool
+    as_json: bool
+    device: str | None
+
+    @property
+    def tells(self) -> bool:
+        """Whether a command says in words what it does."""
+        return not (self.quiet or self.as_json)
+
+    def folder(self, name: str) -> Path:
+        """Return the folder that was asked for, or one of this name in `out`."""
+        return self.out if self.out is not None else Path("out") / name
+
+    def report(self, file: Path, words: Callable[[], Iterable[str]]) -> None:
+        """Print a JSON file that was written, or what came out in lines of words, as was asked for."""
+        if self.as_json:
+            click.echo(file.read_text(encoding="utf-8"), nl=False)
+        elif not self.quiet:
+            for line in words():
+                click.echo(line)
+
+
+def tell(line: str) -> None:
+    """Print a line about the command on standard error."""
+    click.echo(f"warpflat: {line}", err=True)
+
+
 def output_options(
     *, folder: str = "out/NAME", printed: str = "metrics.json", verbose: bool = True
-) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Add the options of a command that writes files into a folder and prints one of them on demand.
+) -> Callable[[Command], Command]:
+    """Add the options of a command that writes files into a folder and prints one of them on demand; it takes them as `output`.
 
     Args:
         folder: the default one, for the help.
         printed: which file --json prints, for the help.
         verbose: whether there is more to print.
     """
-    options = [
+    options: list[Callable[[Command], Command]] = [
         click.option(
             "--out",
             "-o",
@@ -115,14 +158,28 @@ def output_options(
             help=f"Folder for the files.  [default: {folder}]",
         ),
         click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes and warnings."),
-        *([_VERBOSE] if verbose else []),
+        click.option(
+            "--verbose",
+            "-v",
+            is_flag=True,
+            help="Print the tables of pieces and seams, every note, and all advice on the fit.",
+        ),
         click.option("--json", "as_json", is_flag=True, help=f"Print {printed} on standard output, nothing else."),
-        click.option("--device", metavar="NAME", help="Warp device, such as cpu or cuda:0.  [default: Warp's choice]"),
+        scene_option("device"),
     ]
+    if not verbose:
+        del options[2]
 
-    def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    def with_options(command: Command) -> Command:
+        @functools.wraps(command)
+        def with_output(**given: Any) -> Any:
+            names = [field.name for field in fields(Output)]
+            output = Output(**{name: given.pop(name, False) for name in names})
+            return command(**given, output=output)
+
+        made: Command = with_output
         for option in reversed(options):
-            command = option(command)
-        return command
+            made = option(made)
+        return made
 
     return with_options

@@ -17,8 +17,10 @@ from warpflat.app.cli.options import (
     NOT_CONVERGED,
     RUN_FILES,
     ComputingCommand,
+    Output,
     output_options,
-    shear_limit_option,
+    scene_option,
+    tell,
 )
 
 if TYPE_CHECKING:
@@ -30,17 +32,9 @@ __all__ = ["report_run", "run", "run_and_report", "start_warp_silently"]
 
 @click.command(cls=ComputingCommand, epilog=f"{RUN_FILES}\n\n{EXIT_CODES}")
 @click.argument("scene", type=click.Path(path_type=Path))
-@shear_limit_option
+@scene_option("shear_limit")
 @output_options()
-def run(
-    scene: Path,
-    out: Path | None,
-    quiet: bool,
-    verbose: bool,
-    as_json: bool,
-    device: str | None,
-    shear_limit: float | None,
-) -> int:
+def run(scene: Path, shear_limit: float | None, output: Output) -> int:
     """Run a scene file.
 
     A scene is a TOML file that names a surface, its feature lines, a fabric and settings; see the folder scenes.
@@ -52,19 +46,17 @@ def run(
     """
     from warpflat.app.scene.load import load_scene
 
-    loaded = load_scene(scene).allowing(shear_limit)
-    return run_and_report(loaded, out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)
+    return run_and_report(load_scene(scene).allowing(shear_limit), output)
 
 
-def run_and_report(
-    scene: Scene, out: Path | None, *, quiet: bool, verbose: bool, as_json: bool, device: str | None
-) -> int:
+def run_and_report(scene: Scene, output: Output) -> int:
+    """Run a scene, print what came out, and return the exit code."""
     from warpflat.app.cli.progress_bar import ProgressBar
     from warpflat.core import Beside, work_beside
 
-    folder = out if out is not None else Path("out") / scene.name
+    folder = output.folder(scene.name)
     with ExitStack() as stack:
-        bar = stack.enter_context(ProgressBar(scene.name, hidden=quiet or as_json))
+        bar = stack.enter_context(ProgressBar(scene.name, hidden=not output.tells))
         if "warp" in sys.modules:
             # A process beside this one asks Warp for its devices, which starts it.
             start_warp_silently()
@@ -83,8 +75,8 @@ def run_and_report(
             import matplotlib.figure  # noqa: F401
 
         start_warp_silently()
-        result = run_scene(scene, folder, on_progress=bar, device=device, built=built)
-    return report_run(result, folder, quiet=quiet, verbose=verbose, as_json=as_json)
+        result = run_scene(scene, folder, on_progress=bar, device=output.device, built=built)
+    return report_run(result, folder, output)
 
 
 def start_warp_silently() -> None:
@@ -97,32 +89,30 @@ def start_warp_silently() -> None:
     start_warp()
 
 
-def report_run(result: SceneResult, folder: Path, *, quiet: bool, verbose: bool, as_json: bool) -> int:
+def report_run(result: SceneResult, folder: Path, output: Output) -> int:
     """Print the result of a run, and return the exit code."""
+    from warpflat.app.cli.fit_lines import fit_lines
     from warpflat.app.cli.summary import notes_line, summary_lines
     from warpflat.app.cli.tables import drape_lines, run_summary, warnings_of
-    from warpflat.flat import fit_lines
 
     warnings = warnings_of(result.metrics)
-    if not (quiet or as_json):
+    if output.tells:
         # What was left out has a line of its own at the end.
         printed = {*warnings, *result.metrics.get("notes", ())}
         notes = [note for note in result.notes if note not in printed]
-        for line in [f"note: {note}" for note in notes] if verbose else filter(None, [notes_line(notes)]):
-            click.echo(f"warpflat: {line}", err=True)
+        for line in [f"note: {note}" for note in notes] if output.verbose else filter(None, [notes_line(notes)]):
+            tell(line)
     for warning in warnings:
-        click.echo(f"warpflat: {warning}", err=True)
-    if as_json:
-        click.echo((folder / "metrics.json").read_text(encoding="utf-8"), nl=False)
-    elif not quiet and not verbose:
+        tell(warning)
+
+    def words() -> list[str]:
+        metrics, files = result.metrics, result.files
+        if output.verbose:
+            size = [f"size: {result.size}"] if result.size else []
+            return [*size, run_summary(metrics, files, str(folder)), *fit_lines(metrics), *drape_lines(metrics)]
         # A pipe takes whole lines.
         width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
-        for line in summary_lines(result.metrics, result.files, str(folder), size=result.size, width=width):
-            click.echo(line)
-    elif not quiet:
-        if result.size:
-            click.echo(f"size: {result.size}")
-        click.echo(run_summary(result.metrics, result.files, str(folder)))
-        for line in (*fit_lines(result.metrics), *drape_lines(result.metrics)):
-            click.echo(line)
+        return summary_lines(metrics, files, str(folder), size=result.size, width=width)
+
+    output.report(folder / "metrics.json", words)
     return NOT_CONVERGED if warnings else DONE

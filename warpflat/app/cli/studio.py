@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from warpflat.app.cli.options import DONE, EXIT_CODES, ComputingCommand
+from warpflat.app.cli.options import DONE, EXIT_CODES, ComputingCommand, tell
 
 if TYPE_CHECKING:
     from warpflat.app.scene.load import Scene
@@ -79,7 +79,7 @@ def studio(
     page = Page(made, host=host, port=port, out=out)
     click.echo(f"{page.url}  (Ctrl-C ends the studio)")
     if page.door.opens:
-        click.echo(f"warpflat: note: {page.door.opens}", err=True)
+        tell(f"note: {page.door.opens}")
     if show:
         import webbrowser
 

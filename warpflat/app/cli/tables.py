@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
-from warpflat.core import energy_words, format_count
+from warpflat.core import aligned, energy_words, format_count
 from warpflat.flat import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_names
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
                 "yes" if _converged(piece) else "NO",
             )
         )
-    tables = [_aligned(head, rows)]
+    tables = [aligned(head, rows)]
     from warpflat.flat import relaxation_words
 
     if relaxed := relaxation_words(piece["stages"] for piece in metrics["pieces"].values()):
@@ -84,7 +84,7 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
             )
             for seam in metrics["seams"]
         ]
-        tables.append(_aligned(columns, seams, left=(0, 1)))
+        tables.append(aligned(columns, seams, left=(0, 1)))
     if found := metrics.get("garment", {}).get("found_seams"):
         # What closing each seam would cost, per centimetre that is sewn.
         prices = [
@@ -98,12 +98,12 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
             )
             for seam in found
         ]
-        tables.append(_aligned(("found seam", "sewn", "releases", "per cm"), prices))
+        tables.append(aligned(("found seam", "sewn", "releases", "per cm"), prices))
     if metrics.get("constraints"):
         held = [
             (each["name"], f"{each['amiss_mm']:.2f} mm", _price(each["price_j"])) for each in metrics["constraints"]
         ]
-        tables.append(_aligned(("constraint", "amiss", "price"), held))
+        tables.append(aligned(("constraint", "amiss", "price"), held))
     if metrics.get("girths"):
         # Of the pattern with darts and seams closed, the ease got and wanted.
         parts = []
@@ -228,19 +228,15 @@ def mannequin_table(source: str, levels: Mapping[str, Level], difference: SizeDi
         levels: by name.
         difference: of a scan to the nearest size.
     """
-    if difference is None:
-        rows = [(name, f"{100 * level.height:.1f} cm", f"{100 * level.girth:.1f} cm") for name, level in levels.items()]
-        return f"{source}\n{_aligned(('level', 'height', 'girth'), rows)}"
-    head = ("level", "height", "girth", "section", "height over size", "girth over size")
-    full = [
-        (
-            name, f"{100 * level.height:.1f} cm", f"{100 * level.girth:.1f} cm",
-            "" if level.section is None else f"{100 * level.section:.1f} cm",
-            _more(difference.heights, name), _more(difference.girths, name),
-        )
-        for name, level in levels.items()
-    ]  # fmt: skip
-    return f"{source}; nearest size {difference.size}\n{_aligned(head, full)}"
+    head = ["level", "height", "girth"]
+    rows = [[name, f"{100 * level.height:.1f} cm", f"{100 * level.girth:.1f} cm"] for name, level in levels.items()]
+    if difference is not None:
+        source += f"; nearest size {difference.size}"
+        head += ["section", "height over size", "girth over size"]
+        for row, (name, level) in zip(rows, levels.items(), strict=True):
+            section = "" if level.section is None else f"{100 * level.section:.1f} cm"
+            row += [section, _more(difference.heights, name), _more(difference.girths, name)]
+    return f"{source}\n{aligned(head, rows)}"
 
 
 def measures_table(measures: Mapping[str, ScanMeasure], difference: SizeDifference) -> str:
@@ -258,7 +254,7 @@ def measures_table(measures: Mapping[str, ScanMeasure], difference: SizeDifferen
         )
         for name, m in measures.items()
     ]  # fmt: skip
-    return _aligned(head, rows)
+    return aligned(head, rows)
 
 
 def _more(of: Mapping[str, float], name: str) -> str:
@@ -289,7 +285,7 @@ def ledger_table(ledger: Ledger) -> str:
     note = "released and left: model energy of the pieces that it changes, relaxed coarsely"
     both = "; both sides of the body are cut" if any(entry.cut for entry in ledger.entries) else ""
     refused = [f"not possible: {name} ({reason})" for name, reason in ledger.refused]
-    return "\n".join([*peaks, _aligned(head, rows, left=(1,)), f"{note}{both}", *refused])
+    return "\n".join([*peaks, aligned(head, rows, left=(1,)), f"{note}{both}", *refused])
 
 
 def edit_table(edit: Mapping[str, Any]) -> str:
@@ -304,7 +300,7 @@ def edit_table(edit: Mapping[str, Any]) -> str:
     for name in dict.fromkeys((*before["mouths_m"], *after["mouths_m"])):
         widths = (each["mouths_m"].get(name) for each in (before, after))
         rows.append((name, *("-" if width is None else f"{1e3 * width:.1f} mm" for width in widths)))
-    return _aligned(("", "before", "after"), rows)
+    return aligned(("", "before", "after"), rows)
 
 
 def fabric_table(fabrics: Sequence[Fabric]) -> str:
@@ -338,7 +334,7 @@ def fabric_table(fabrics: Sequence[Fabric]) -> str:
         *([f"also known: {', '.join(also)}"] if also else []),
         f"default: {DEFAULT_FABRIC}; test loads and sources: warpflat fabrics NAME",
     ]
-    return "\n".join([_aligned(head, rows, left=(0, 9)), "", *notes])
+    return "\n".join([aligned(head, rows, left=(0, 9)), "", *notes])
 
 
 def fabric_sheet(fabric: Fabric) -> str:
@@ -360,7 +356,7 @@ def fabric_sheet(fabric: Fabric) -> str:
     parts = [f"{fabric.name}: {fabric.description}" if fabric.description else fabric.name]
     if fabric.aliases:
         parts.append(f"also: {', '.join(fabric.aliases)}")
-    parts += ["", _aligned(("value", "", "unit", "test load", "grade", "source"), rows, left=(0, 2, 3, 4, 5))]
+    parts += ["", aligned(("value", "", "unit", "test load", "grade", "source"), rows, left=(0, 2, 3, 4, 5))]
     for key in ("curve_warp", "curve_weft"):
         if points := getattr(fabric, key):
             text = ", ".join(f"{100 * strain:.3g} %: {tension:.3g} N/m" for strain, tension in points)
@@ -386,16 +382,3 @@ def _estimate_sign(fabric: Fabric, key: str) -> str:
     if origin is None:
         return ""
     return "~" if origin.is_estimate else ">" if origin.at_least else ""
-
-
-def _aligned(head: Sequence[str], rows: Sequence[Sequence[str]], *, left: Sequence[int] = (0,)) -> str:
-    """Align rows in columns under their heads, to the right but for the columns listed in `left`."""
-    table = [head, *rows]
-    widths = [max(len(row[column]) for row in table) for column in range(len(head))]
-    return "\n".join(
-        "  ".join(
-            cell.ljust(width) if column in left else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in table
-    )

@@ -33,6 +33,7 @@ from warpflat.pattern import (
     DRAFTED,
     DRAFTED_CLOTH,
     LEAST_GAP,
+    LEAST_PRESSURE,
     SKIN,
     Scale,
     VertexColours,
@@ -51,7 +52,7 @@ _VERTEX = 5
 _COLOURS = 256
 #: Maps beside energy and strain, by the name of their primvar: unit on the page, how many of these the file's unit is, and the least
 #: upper end of a scale.
-MAPS: Mapping[str, tuple[str, float, float]] = {"pressure": ("Pa", 1.0, 10.0), "gap": ("mm", 1e3, LEAST_GAP)}
+MAPS: Mapping[str, tuple[str, float, float]] = {"pressure": ("Pa", 1.0, LEAST_PRESSURE), "gap": ("mm", 1e3, LEAST_GAP)}
 # No value of a map is larger.
 _MOST_OF_MAP = 1e9
 # A body of more vertices than these is not shown.

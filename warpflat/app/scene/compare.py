@@ -11,10 +11,11 @@ from warpflat.app.scene.comparison import Comparison
 from warpflat.app.scene.drape import drape_scene
 from warpflat.app.scene.form_shaping import settle_shape
 from warpflat.app.scene.load import Scene, scene_fabric
-from warpflat.app.scene.plan import MeshPlan, plan_scene
-from warpflat.core import InputError, laid_upon
-from warpflat.flat import STRAINS, Progress, advise, judge
+from warpflat.app.scene.plan import plan_scene
+from warpflat.core import InputError, aligned, laid_upon
+from warpflat.flat import Progress, advise, judge
 from warpflat.garment import Garment
+from warpflat.pattern import STRAINS
 
 __all__ = ["compare_fabrics", "compared_files", "comparison_table", "save_comparison"]
 
@@ -54,17 +55,13 @@ def compare_fabrics(
         known.update(dict.fromkeys((fabric.name, *fabric.aliases), fabric.name))
         dressed[fabric.name] = one
     plan = plan_scene(scene, device=device)
-    if isinstance(plan, MeshPlan):
-        # Cuts are found once, and all of them are made, so that all patterns have the same points.
-        plan = replace(plan, sequences=[replace(sequence, auto=None) for sequence in plan.sequences])
     garments: dict[str, Garment] = {}
     for name, one in dressed.items():
 
         def report(_: str, progress: Progress, fabric: str = name) -> bool | None:
             return None if on_progress is None else on_progress(fabric, progress)
 
-        cloth = replace(plan, scene=one) if isinstance(plan, MeshPlan) else plan_scene(one, device=device)
-        garments[name] = cloth.flatten(callback=report)
+        garments[name] = plan.in_cloth(one).flatten(callback=report)
     results = {name: {part: advise(flat) for part, flat in garment.parts.items()} for name, garment in garments.items()}
     first = next(iter(results.values()))
     layouts = {
@@ -125,7 +122,7 @@ def comparison_table(comparison: Comparison) -> str:
             ("converged", ["yes" if m["converged"] else "NO" for m in measures]),
             *[(f"{point} [mm]", ["-", *(f"{1e3 * d[point]:.1f}" for d in distances)]) for point in distances[0]],
         ]
-        blocks.append(_columns(piece, comparison.fabrics, rows))
+        blocks.append(aligned((piece, *comparison.fabrics), [(name, *cells) for name, cells in rows]))
     if comparison.drapes:
         # Gap, strain and pressure of each drape.
         found = [comparison.drapes[fabric].measures() for fabric in comparison.fabrics]
@@ -134,26 +131,21 @@ def comparison_table(comparison: Comparison) -> str:
         def millimetres(key: str, part: str) -> list[str]:
             return [f"{1e3 * m[key][part]:.1f}" for m in found]
 
-        blocks.append(
-            _columns(
-                "worn",
-                comparison.fabrics,
-                [
-                    ("largest gap [mm]", [f"{1e3 * max(m['gap_m'].values(), default=0.0):.1f}" for m in found]),
-                    ("gap at", [max(m["gap_m"], key=m["gap_m"].__getitem__, default="-") for m in found]),
-                    ("distance, mean [mm]", millimetres("distance_m", "mean")),
-                    ("misfit, mean [mm]", millimetres("misfit_m", "mean")),
-                    ("misfit, most [mm]", millimetres("misfit_m", "max")),
-                    *_strain_rows(found, "p5", "p95"),
-                    ("beyond limit [%]", [f"{100 * m['outside']:.1f}" for m in found]),
-                    ("pressure, mean [Pa]", [f"{m['pressure_pa']['mean']:.0f}" for m in found]),
-                    ("pressure, 95 % [Pa]", [f"{m['pressure_pa']['p95']:.0f}" for m in found]),
-                    ("touching [%]", [f"{100 * m['pressure_pa']['touching']:.0f}" for m in found]),
-                    ("fits", ["yes" if verdict.fits else "no" for verdict in verdicts]),
-                    ("at rest", ["yes" if m["converged"] else "NO" for m in found]),
-                ],
-            )
-        )
+        rows = [
+            ("largest gap [mm]", [f"{1e3 * max(m['gap_m'].values(), default=0.0):.1f}" for m in found]),
+            ("gap at", [max(m["gap_m"], key=m["gap_m"].__getitem__, default="-") for m in found]),
+            ("distance, mean [mm]", millimetres("distance_m", "mean")),
+            ("misfit, mean [mm]", millimetres("misfit_m", "mean")),
+            ("misfit, most [mm]", millimetres("misfit_m", "max")),
+            *_strain_rows(found, "p5", "p95"),
+            ("beyond limit [%]", [f"{100 * m['outside']:.1f}" for m in found]),
+            ("pressure, mean [Pa]", [f"{m['pressure_pa']['mean']:.0f}" for m in found]),
+            ("pressure, 95 % [Pa]", [f"{m['pressure_pa']['p95']:.0f}" for m in found]),
+            ("touching [%]", [f"{100 * m['pressure_pa']['touching']:.0f}" for m in found]),
+            ("fits", ["yes" if verdict.fits else "no" for verdict in verdicts]),
+            ("at rest", ["yes" if m["converged"] else "NO" for m in found]),
+        ]
+        blocks.append(aligned(("worn", *comparison.fabrics), [(name, *cells) for name, cells in rows]))
     note = f"distances: from the pattern in {comparison.fabrics[0]}, the others laid upon it by turning and shifting"
     return "\n\n".join(blocks) + f"\n\n{note}"
 
@@ -167,14 +159,3 @@ def _strain_rows(measures: Sequence[Mapping[str, Any]], low: str, high: str) -> 
         )
         for key, word, factor, unit in STRAINS
     ]
-
-
-def _columns(title: str, fabrics: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]]) -> str:
-    left = max(len(title), *(len(name) for name, _ in rows))
-    widths = [max(len(fabric), *(len(cells[k]) for _, cells in rows)) for k, fabric in enumerate(fabrics)]
-    lines = ["  ".join([title.ljust(left), *(f.rjust(w) for f, w in zip(fabrics, widths, strict=True))])]
-    lines += [
-        "  ".join([name.ljust(left), *(cell.rjust(w) for cell, w in zip(cells, widths, strict=True))])
-        for name, cells in rows
-    ]
-    return "\n".join(lines)

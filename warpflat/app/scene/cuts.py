@@ -16,10 +16,12 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CutSequence",
+    "asked_cuts",
     "cut_form",
     "cut_of_dart",
     "cuts_beside",
     "flatten_and_cut",
+    "omitted",
     "place_of",
     "plan_automatic_cuts",
     "plan_cuts",
@@ -264,6 +266,17 @@ def _dart(table: CutTable) -> FormDart:
     )
 
 
+def omitted(dart: FormDart, **more: str) -> dict[str, Any]:
+    """Return the table of `[[cuts]]` that leaves out the form's own dart at the place of a dart."""
+    place = zip(("piece", "line", "towards", "at"), dart.place, strict=True)
+    return {**more, **{key: value for key, value in place if value is not None}, "omit": True}
+
+
+def asked_cuts(scene: Scene) -> list[dict[str, Any]]:
+    """Return the tables `[[cuts]]` of a scene."""
+    return [table.given() for table in scene.settings.cuts]
+
+
 def cut_of_dart(dart: FormDart) -> dict[str, Any]:
     """Return the table of `[[cuts]]` that asks for a dart; what is the default anyway is left out."""
     keys: dict[str, Any] = {"name": dart.name, "piece": dart.piece, "line": dart.line}
@@ -285,7 +298,7 @@ def scene_with(scene: Scene, **tables: Any) -> Scene:
     Raises:
         InputError: as :func:`warpflat.app.scene.load.make_scene`.
     """
-    data = scene.settings.model_dump(exclude_unset=True, by_alias=True) | tables
+    data = scene.settings.given() | tables
     kept = {key: value for key, value in data.items() if value is not None}
     made = make_scene(kept, name=scene.name, folder=scene.folder, where=scene.where)
     return replace(made, name=scene.name, sources=scene.sources)

@@ -102,13 +102,12 @@ def drape_scene(scene: Scene, garment: Garment | Flattening, *, device: str | No
     Raises:
         InputError: an unknown line, or half pieces.
     """
-    from warpflat.garment import DrapeOptions, drape
+    from warpflat.garment import drape
 
     table = scene.settings.drape or DrapeTable()
     report_activity("draping")
     with errors_named(scene.where):
-        options = DrapeOptions(friction=table.friction, tolerance=table.tolerance, max_steps=table.max_steps)
         return drape(
-            garment, hold=table.hold, elastics=[each.edge for each in scene.settings.finishing if each.elastic], options=options,
-            device=device or scene.settings.device,
+            garment, hold=table.hold, elastics=[each.edge for each in scene.settings.finishing if each.elastic],
+            options=table.options(), device=device or scene.settings.device,
         )  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import re
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -20,7 +19,8 @@ from warpflat.app.scene.options import COMMAND_LINE, errors_of_options
 from warpflat.core import (
     FloatArray,
     InputError,
-    is_number,
+    aligned,
+    atomic_path,
     listening_to_reads,
     make_file_name,
     make_piece_name,
@@ -31,21 +31,23 @@ from warpflat.garment import EASE_LEVELS
 
 if TYPE_CHECKING:
     from warpflat.app.scene.run import SceneResult
-    from warpflat.flat import RawMesh, SewnPanel
-    from warpflat.garment import CommonBody, GarmentFile
+    from warpflat.flat import RawMesh
+    from warpflat.garment import CommonBody, GarmentFile, SewnPanel
 
 __all__ = [
+    "STUDY_FILES",
     "Carried",
     "FitJob",
     "Fitted",
     "check_tables",
     "ease_wishes",
     "fit_to",
-    "require_own_study",
     "study_table",
     "write_study",
 ]
 
+#: What a study leaves, the table of several bodies last.
+STUDY_FILES = ("fit.json", "fit.csv")
 # A garment lies on its body if half of its cloth is nearer than this [m].
 _BESIDE = 0.2
 # Ease is kept if it is by this [m] what it was, or what was asked.
@@ -54,7 +56,8 @@ _KEPT = 0.01
 _WITHIN, _TOLD = 0.002, 0.01
 # A curve in which a plane meets the cloth is a wrinkle below this share of the longest one.
 _WRINKLE = 0.05
-_LENGTH = re.compile(r"\s*(?P<level>[a-z]+)\s*=\s*(?P<value>[-+0-9.eE]+)\s*(?P<unit>mm|cm|m|in)\s*")
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_LENGTH = re.compile(rf"\s*(?P<level>[a-z]+)\s*=\s*(?P<value>{_NUMBER})\s*(?P<unit>mm|cm|m|in)\s*", re.ASCII)
 _UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 # A texture that may be a normalised one is a pattern where so much of the worn cloth at most is stretched against it, in nine of ten cells.
 _AS_WORN = 0.1
@@ -305,11 +308,8 @@ class FitJob:
             carried.vertices[cKDTree(self.read.raw.vertices * self.read.scale).query(layer.vertices)[1]]
             for layer in layers
         ]
-        starts = np.cumsum([0, *(len(layer.vertices) for layer in layers)])
-        triangles = np.concatenate(
-            [triangulate(layer.faces)[0] + start for layer, start in zip(layers, starts, strict=False)]
-        ).astype(np.int64)
-        worn = Mesh(np.concatenate([layer.vertices for layer in layers]), triangles)
+        cloth, triangles = _joined([(layer.vertices, triangulate(layer.faces)[0].astype(np.int64)) for layer in layers])
+        worn = Mesh(cloth, triangles)
         everywhere = np.concatenate(now)
 
         def moved(places: Sequence[Any]) -> list[Any]:
@@ -355,7 +355,7 @@ def _known_pattern(read: GarmentFile, name: str) -> list[SewnPanel]:
     A texture in millimetres or centimetres has been measured. One that fits in another unit may be a normalised one by chance: it must lay
     the cloth nearly as it is worn.
     """
-    from warpflat.flat import sewn_panels, stretches_worn
+    from warpflat.garment import sewn_panels, stretches_worn
 
     try:
         panels = sewn_panels(read.raw, read.scale, name=make_piece_name(name))
@@ -376,12 +376,12 @@ def ease_wishes(texts: Sequence[str]) -> dict[str, float]:
     found: dict[str, float] = {}
     for text in texts:
         match = _LENGTH.fullmatch(text)
-        value = float(match["value"]) * _UNITS[match["unit"]] if match and _is_float(match["value"]) else None
-        if match is None or value is None:
+        if match is None:
             raise InputError(f"--ease {quote_value(text)}: give a level and a length with its unit, as waist=40mm")
         if match["level"] not in EASE_LEVELS:
             raise InputError(f"--ease {quote_value(text)}: level {nearest(match['level'], EASE_LEVELS)}")
-        if not is_number(value) or not _RANGE[0] <= value <= _RANGE[1]:
+        value = float(match["value"]) * _UNITS[match["unit"]]
+        if not _RANGE[0] <= value <= _RANGE[1]:
             raise InputError(f"--ease {quote_value(text)}: ease is from -30 to 400 cm")
         if match["level"] in found:
             raise InputError(f"--ease: {match['level']} is given twice; give it once")
@@ -426,9 +426,8 @@ def fit_to(
         InputError: the garment cannot be flattened, or `out` cannot be written.
     """
     from warpflat.app.scene.run import files_of_run, run_scene
-    from warpflat.core import atomic_path, output_folder, record_file
-    from warpflat.flat import graded_layout, with_cuts
-    from warpflat.garment import finer_body
+    from warpflat.core import output_folder, record_file
+    from warpflat.garment import finer_body, graded_layout, with_cuts
 
     known, raw = job.panels if job.keeps_pattern(tables) else [], job.read.raw
     if known:
@@ -500,65 +499,44 @@ class Fitted:
         }
 
 
-def require_own_study(folder: Path) -> None:
-    """Check that `fit.json` and `fit.csv` in a folder are of an earlier study, since they will be replaced.
-
-    Raises:
-        InputError: one of them is not.
-    """
-    report, table = folder / "fit.json", folder / "fit.csv"
-    try:
-        data = json.loads(report.read_bytes()) if report.exists() else None
-    except (OSError, ValueError, RecursionError):
-        data = ""
-    for file, ours in (
-        (report, data is None or (isinstance(data, dict) and "warpflat" in data)),
-        (table, data is not None),
-    ):
-        if file.exists() and not ours:
-            raise InputError(
-                f"{file}: is not of warpflat, and would be replaced; move it away, or choose another folder"
-            )
-
-
 def write_study(folder: Path, fitted: Sequence[Fitted]) -> list[str]:
-    """Write `fit.json`, and of several bodies `fit.csv`, and return their names.
+    """Write `fit.json`, and of several bodies `fit.csv`, both or none, and return their names.
 
     Raises:
-        InputError: they cannot be written.
+        InputError: they cannot be written, or would replace what is not of warpflat.
     """
     from warpflat._version import __version__
-    from warpflat.core import atomic_path, write_json
+    from warpflat.core import output_folder, write_report
 
     entries = [
         {**each.carried.as_dict(), "folder": str(each.folder), "fits": each.fits, "done": each.converged}
         for each in fitted
     ]
-    write_json(folder / "fit.json", {"warpflat": __version__, "bodies": entries})
-    if len(fitted) == 1:
-        return ["fit.json"]
-    with atomic_path(folder / "fit.csv") as path, path.open("w", encoding="utf-8", newline="") as file:
-        rows = [each.row() for each in fitted]
-        table = csv.DictWriter(file, list(rows[0]))
-        table.writeheader()
-        table.writerows(rows)
-    return ["fit.json", "fit.csv"]
+    files = STUDY_FILES if len(fitted) > 1 else STUDY_FILES[:1]
+    with output_folder(folder, files, guard=True) as to:
+        if len(fitted) > 1:
+            with atomic_path(to / "fit.csv") as path, path.open("w", encoding="utf-8", newline="") as file:
+                rows = [each.row() for each in fitted]
+                table = csv.DictWriter(file, list(rows[0]))
+                table.writeheader()
+                table.writerows(rows)
+        write_report(to / "fit.json", {"warpflat": __version__, "bodies": entries}, name="fit", files=files)
+    return list(files)
 
 
-def study_table(fitted: Sequence[Fitted]) -> list[str]:
-    """Return the lines of the table of a study: ease by level [mm]."""
-    rows = [each.row() for each in fitted]
-    width, fits = max(4, *(len(row["body"]) for row in rows)), {True: "yes", False: "no", None: "-"}
-    lines = [
-        f"{'ease [mm]':{width}}"
-        + "".join(f"{level:>11}" for level in EASE_LEVELS)
-        + f"{'pieces':>8}{'cloth m2':>10}{'fits':>6}"
+def study_table(fitted: Sequence[Fitted]) -> str:
+    """Return the table of a study: ease by level [mm]."""
+    rows, fits = [each.row() for each in fitted], {True: "yes", False: "no", None: "-"}
+    eases = [
+        ["-" if (ease := row[f"ease_{level}_mm"]) is None else f"{ease:+.0f}" for level in EASE_LEVELS] for row in rows
     ]
-    for row in rows:
-        eases = (row[f"ease_{level}_mm"] for level in EASE_LEVELS)
-        cells = "".join(f"{'-' if ease is None else format(ease, '+.0f'):>11}" for ease in eases)
-        lines.append(f"{row['body']:{width}}{cells}{row['pieces']:>8}{row['area_m2']:>10.2f}{fits[row['fits']]:>6}")
-    return lines
+    return aligned(
+        ("ease [mm]", *EASE_LEVELS, "pieces", "cloth m2", "fits"),
+        [
+            (row["body"], *ease, str(row["pieces"]), f"{row['area_m2']:.2f}", fits[row["fits"]])
+            for row, ease in zip(rows, eases, strict=True)
+        ],
+    )
 
 
 @lru_cache(maxsize=4)
@@ -630,10 +608,3 @@ def _obj_lines(vertices: FloatArray, raw: RawMesh) -> str:
         ]
         lines.append("f " + " ".join(words))
     return "\n".join(lines) + "\n"
-
-
-def _is_float(text: str) -> bool:
-    try:
-        return bool(np.isfinite(float(text)))
-    except ValueError:
-        return False

@@ -20,7 +20,7 @@ from warpflat.garment import (
     shipped_form,
 )
 
-__all__ = ["scene_form", "scene_recipe"]
+__all__ = ["scene_form", "scene_mannequin", "scene_recipe"]
 
 
 def scene_form(
@@ -51,19 +51,26 @@ def scene_form(
     return mannequin, built
 
 
+def scene_mannequin(scene: Scene, *, size: str | None = None) -> Mannequin:
+    """Build the scene's mannequin, or the same in another size.
+
+    Raises:
+        InputError: there is no such body.
+    """
+    table = scene.settings.mannequin
+    assert table is not None  # the schema sees to it
+    table = table if size is None else table.model_copy(update={"size": size})
+    with errors_named(f"{scene.where}: {'mannequin' if size is None else 'pattern.sizes'}"):
+        return mannequin_from_table(table, path_of=lambda file: scene.folder / expand_variables(file))
+
+
 def scene_recipe(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mannequin, Form]:
     """Return the scene's mannequin, or the one that is given, and its form with its cuts, not yet built on it.
 
     Raises:
         InputError: the body, the form or a brick is wrong.
     """
-    settings = scene.settings
-    assert settings.mannequin is not None  # the schema sees to it
-    if mannequin is None:
-        with errors_named(f"{scene.where}: mannequin"):
-            mannequin = mannequin_from_table(
-                settings.mannequin, path_of=lambda file: scene.folder / expand_variables(file)
-            )
+    settings, mannequin = scene.settings, mannequin or scene_mannequin(scene)
     with errors_named(f"{scene.where}: form"):
         if isinstance(settings.form, str):
             form = shipped_form(settings.form)

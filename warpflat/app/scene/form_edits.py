@@ -9,12 +9,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from warpflat.app.scene.cuts import cut_of_dart, cuts_beside, place_of, scene_with
+from warpflat.app.scene.as_toml import tables_as_toml
+from warpflat.app.scene.cuts import asked_cuts, cut_of_dart, cuts_beside, omitted, place_of, scene_with
 from warpflat.app.scene.form import scene_form, scene_recipe
 from warpflat.app.scene.form_shaping import settle_shape
 from warpflat.app.scene.load import Scene
 from warpflat.app.scene.plan import plan_garment
-from warpflat.core import InputError, nearest, polyline_length, tables_as_toml
+from warpflat.core import InputError, nearest, polyline_length
 from warpflat.garment import FormDart, FormGarment, plan_form
 
 __all__ = ["KINDS", "DartEdit", "edit_dart", "rotate_dart", "split_dart", "turn_dart"]
@@ -46,7 +47,7 @@ class DartEdit:
         """Return the tables `[[cuts]]` and `[[seams]]` of the scene."""
         settings = self.scene.settings
         return tables_as_toml({
-            key: [table.model_dump(exclude_unset=True, by_alias=True) for table in getattr(settings, key)]
+            key: [table.given() for table in getattr(settings, key)]
             for key in ("cuts", "seams")
         })  # fmt: skip
 
@@ -165,7 +166,7 @@ def turn_dart(scene: Scene, dart: str, into: str, garment: FormGarment) -> Scene
     if into == "pleat":
         pleat = cut_of_dart(replace(old, pleat_mm=PLEAT_MM))
         return scene_with(scene, cuts=[*_cuts_without(scene, old, keep=True), pleat])
-    seams = [table.model_dump(exclude_unset=True, by_alias=True) for table in scene.settings.seams]
+    seams = [table.given() for table in scene.settings.seams]
     for name, (longer, share) in _shares(old, garment).items():
         how = {"fullness": round(share, 4)} if into == "ease" else {"gather": round(1.0 + share, 4)}
         if into == "ease" and share > 0.3:
@@ -189,12 +190,10 @@ def _find(scene: Scene, dart: str) -> FormDart:
 
 def _cuts_without(scene: Scene, dart: FormDart, *, keep: bool = False) -> list[dict[str, Any]]:
     """Return a scene's `[[cuts]]` without those at the place of a dart; one of the form's own is left out, unless to be kept."""
-    own = [table.model_dump(exclude_unset=True, by_alias=True) for table in scene.settings.cuts]
-    cuts = [cut for cut in own if place_of(cut) != dart.place]
+    cuts = [cut for cut in asked_cuts(scene) if place_of(cut) != dart.place]
     shaped = {other.place for other in scene_recipe(scene_with(scene, cuts=[]))[1].darts}
     if dart.place in shaped and not keep:
-        keys = zip(("piece", "line", "towards", "at"), dart.place, strict=True)
-        cuts.append({"name": dart.name, **{key: value for key, value in keys if value is not None}, "omit": True})
+        cuts.append(omitted(dart, name=dart.name))
     return cuts
 
 

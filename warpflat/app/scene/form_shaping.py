@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from warpflat.app.scene.cuts import place_of, scene_with
+from warpflat.app.scene.cuts import asked_cuts, omitted, place_of, scene_with
 from warpflat.app.scene.form import scene_recipe
 from warpflat.app.scene.ledger import candidate_cuts, trial_of_scene, try_cuts, with_cut
 from warpflat.app.scene.load import Scene
@@ -45,16 +45,11 @@ def settle_shape(scene: Scene, *, device: str | None = None) -> tuple[Scene, tup
             scene_with(scene, auto_cut=None), auto.is_enough, most=auto.max_cuts, by=auto.by, device=device
         )
         return cut, (_note(made),)
-    own = [table.model_dump(exclude_unset=True, by_alias=True) for table in settings.cuts]
+    own = asked_cuts(scene)
     bare = scene_with(scene, shape="darts")
     places = {place_of(table) for table in own}
-    omitted = [
-        {key: value for key, value in zip(("piece", "line", "towards", "at"), dart.place, strict=True) if value}
-        | {"omit": True}
-        for dart in scene_recipe(scene_with(bare, cuts=[]))[1].darts
-        if dart.place not in places
-    ]
-    bare = scene_with(bare, cuts=[*own, *omitted])
+    book = scene_recipe(scene_with(bare, cuts=[]))[1].darts
+    bare = scene_with(bare, cuts=[*own, *(omitted(dart) for dart in book if dart.place not in places)])
     cut, made = _cut(bare, lambda piece: piece.fit.outside == 0.0, by="released", usual_only=True, device=device)
     return cut, (_note(made),)
 
@@ -172,11 +167,9 @@ def without_closed_darts(scene: Scene, garments: Iterable[FormGarment]) -> tuple
         closed, crowded = [dart for dart in closed if ELBOW in dart.place], []
     if not closed and not crowded:
         return scene, ()
-    cuts = [table.model_dump(exclude_unset=True, by_alias=True) for table in scene.settings.cuts]
-    notes = []
+    cuts, notes = asked_cuts(scene), []
     for dart in (*closed, *(dart for dart in crowded if dart not in closed)):
-        place = zip(("piece", "line", "towards", "at"), dart.place, strict=True)
-        cuts.append({key: value for key, value in place if value} | {"omit": True})
+        cuts.append(omitted(dart))
         if dart in closed:
             why = "is left out, since the cloth would not open it; [[cuts]] with mouth_mm keeps it"
         elif dart.piece in movable:

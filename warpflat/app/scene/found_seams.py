@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.app.scene.load import Scene, errors_named, expand_variables, scene_fabric
-from warpflat.app.scene.schema import FileSurface, SeamCutTable
+from warpflat.app.scene.schema import FileSurface, FindSeamsTable, SeamCutTable
 from warpflat.app.scene.surface import scene_surface
 from warpflat.core import (
     InputError,
@@ -32,11 +32,11 @@ from warpflat.flat import half_edges, weld_map
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from warpflat.flat import Fabric, FileSeams, Flattening, Surface
-    from warpflat.garment import FoundSeams, GarmentFile, SeamCut
+    from warpflat.flat import Fabric, Flattening, Surface
+    from warpflat.garment import FileSeams, FoundSeams, GarmentFile, SeamCut
     from warpflat.pattern import FoundSeam
 
-__all__ = ["NO_PATTERN", "found_seams", "plain_panel", "read_edges", "seams_entry"]
+__all__ = ["NO_PATTERN", "found_seams", "plain_panel", "read_edges", "seams_entry", "waist_of_body"]
 
 #: More than this share of the cloth beyond its limit is no pattern yet.
 NO_PATTERN = 0.1
@@ -56,71 +56,46 @@ def found_seams(scene: Scene) -> FoundSeams | None:
     Raises:
         InputError: the file is wrong.
     """
-    from warpflat.app.scene.body_waist import waist_of_body
-    from warpflat.flat import FILE_SEAMS, MOST_ISLANDS, file_seams, like_cut_pieces, object_parts
-    from warpflat.garment import SeamOptions, find_seams, read_garment
+    from warpflat.flat import object_parts
+    from warpflat.garment import FILE_SEAMS, SeamOptions, file_seams, find_seams, like_cut_pieces, read_garment
 
     settings, table = scene.settings, scene.settings.surface
-    asked, drawn = settings.find_seams, settings.seams_cut
-    if not isinstance(table, FileSurface) or (asked is not None and asked.find == "none" and not (drawn or asked.keep)):
+    drawn, asked = settings.seams_cut, settings.find_seams or FindSeamsTable()
+    # With a table [seams] somebody has said what is to be cut; without it what is drawn, or what cannot lie flat.
+    is_asked = settings.find_seams is not None
+    is_silent = not is_asked and not drawn
+    if not isinstance(table, FileSurface) or (asked.find == "none" and not (drawn or asked.keep)):
         return None
-    of_file = asked is not None and asked.find in ("file", *FILE_SEAMS)
-    own = ("lines", "cuts", "auto_cut", "datum", "start", "constraints", "seams", "drape")
-    if asked is None and not drawn and any(getattr(settings, key) for key in own):
+    all_parts, of_file = table.component == "all", asked.find in ("file", *FILE_SEAMS)
+    of_one_piece = ("lines", "cuts", "auto_cut", "datum", "start", "constraints", "seams", "drape")
+    if is_silent and (table.component not in (None, "all") or any(getattr(settings, key) for key in of_one_piece)):
         return None
-    all_parts = table.component == "all"
-    if asked is None and not drawn and table.component is not None and not all_parts:
-        return None
-    if all_parts and asked is not None and asked.find == "none":
+    if all_parts and asked.find == "none":
         return None
     with errors_named(f"{scene.where}: surface.file"):
         path = scene.folder / expand_variables(table.file)
     try:
         read = read_garment(path, units=table.units, prim=table.prim, name=scene.name)
     except InputError:
-        if (asked is None and not drawn) or (all_parts and not of_file):
+        if is_silent or (all_parts and not of_file):
             return None
         raise
     layers: Sequence[Surface] = read.layers
     # Before anything is tried on it, or read again.
     require_memory_for_run(sum(len(layer.vertices) for layer in layers), frames=settings.output.frames > 0)
-    seams, taken, notes = file_seams(read.raw), None, list[str]()
-    if asked is not None and of_file:
-        wanted = FILE_SEAMS if asked.find == "file" else (asked.find,)
-        taken = next((seams[way] for way in wanted if way in seams), None)
-        if taken is None:
-            lacks = {
-                "uv": "texture coordinates",
-                "materials": "more than one material",
-                "groups": "more than one group",
-            }
-            other = f"seams by {' and '.join(seams)}" if seams else "no other seams either"
-            raise InputError(
-                f"{path}: find = {asked.find!r}: the file does not have {' or '.join(lacks[way] for way in wanted)}; it has "
-                f'{other}: give find = "auto" (--seams auto) to look for seams'
-            )
-        if len(taken.names) > MOST_ISLANDS:
-            raise InputError(
-                f"{path}: find = {asked.find!r}: {taken.describe()} are too many for a pattern, which has at most {MOST_ISLANDS} pieces; "
-                'find = "auto" (--seams auto) looks for seams'
-            )
-    by_itself = asked is None and not all_parts and _is_whole_garment(layers[0])
-    ignored = asked is not None and _TEXTURE in asked.no
-    if (
-        not of_file
-        and (asked is None or asked.find == "auto")
-        and not ignored
-        and "uv" in seams
-        and len(seams["uv"].edges)
-    ):
-        why = like_cut_pieces(read.raw, seams["uv"])
+    seams, notes = file_seams(read.raw), list[str]()
+    taken = _asked_of_file(path, asked.find, seams) if of_file else None
+    by_itself = not is_asked and not all_parts and _is_whole_garment(layers[0])
+    looked_for = by_itself or (is_asked and asked.find == "auto")
+    islands = seams.get("uv")
+    if asked.find == "auto" and _TEXTURE not in asked.no and islands is not None and len(islands.edges):
+        why = like_cut_pieces(read.raw, islands)
         parts = int(object_parts(read.raw.vertices, read.raw.polygons)[0].max()) + 1 if all_parts else 1
-        more = len(seams["uv"].names) > parts
-        if not why and (by_itself or (more and not drawn) or asked is not None):
-            taken = seams["uv"]
-        elif why and (by_itself or asked is not None) and not all_parts:
-            notes.append(f"{seams['uv'].describe()} were not taken for cut pieces, as {why}; --seams uv takes them")
-    if taken is None and (all_parts or (asked is None and not drawn and not by_itself)):
+        if not why and (looked_for or (len(islands.names) > parts and not drawn)):
+            taken = islands
+        elif why and looked_for and not all_parts:
+            notes.append(f"{islands.describe()} were not taken for cut pieces, as {why}; --seams uv takes them")
+    if taken is None and (all_parts or (is_silent and not by_itself)):
         return None
     if isinstance(table.component, int):
         if table.component >= len(layers):
@@ -130,62 +105,97 @@ def found_seams(scene: Scene) -> FoundSeams | None:
         layers = [layers[table.component]]
     elif table.component == "largest":
         layers = layers[:1]
-    given: dict[str, Any] = {} if asked is None else asked.model_dump(exclude={"smooth_mm", "body"})
-    looked_for = by_itself or (asked is not None and asked.find == "auto")
-    given["find"] = "auto" if taken is None and looked_for else "none"
-    smooth = 0.0 if asked is None else 1e-3 * asked.smooth_mm
-    cuts = by_hand = [cut for number, one in enumerate(drawn) for cut in _as_cuts(scene, number, one, read.marks)]
+    by_hand = [cut for number, one in enumerate(drawn) for cut in _as_cuts(scene, number, one, read.marks)]
+    of_islands: list[SeamCut] = []
     if taken is not None:
         if taken.joined:
             notes.append(
                 f"{format_count(taken.joined, 'island')} of less than a thousandth of the cloth joined to a neighbour"
             )
         of_islands = _cuts_of_file(taken, read, layers, f"{path}")
-        cuts = [*by_hand, *of_islands]
         if not of_islands and not of_file:
             # They parted the inner shell from the outer one.
-            taken, given["find"] = None, "auto" if looked_for else "none"
-            if asked is None and not drawn and not by_itself:
+            taken = None
+            if is_silent and not by_itself:
                 return None
     waist = None
-    if asked is not None and asked.body is not None:
+    if asked.body is not None:
         with errors_named(f"{scene.where}: find_seams.body"):
             waist = waist_of_body(scene.folder / expand_variables(asked.body), read.scale)
         notes.append(f"a waist is looked for where the body of {Path(asked.body).name} has its own")
     with errors_named(scene.where):
         options = SeamOptions(
-            **{
-                **given,
-                "no": tuple(name for name in given.get("no", ()) if name != _TEXTURE),
-                "keep": tuple(given.get("keep", ())),
-            },
-            smooth=smooth,
-            cuts=tuple(cuts),
-            waist=waist,
-        )
+            find="auto" if taken is None and looked_for else "none", cuts=(*by_hand, *of_islands), up=asked.up, front=asked.front,
+            no=tuple(name for name in asked.no if name != _TEXTURE), keep=tuple(asked.keep), limit=asked.limit,
+            most_pieces=asked.most_pieces, smooth=1e-3 * asked.smooth_mm, waist=waist,
+        )  # fmt: skip
         fabric = scene_fabric(scene)
         found = find_seams(layers, options, fabric=fabric)
         if taken is not None and looked_for and (beyond := _beyond_limit(found.pieces, fabric)) > NO_PATTERN:
             knit = _knit_for(found.pieces, fabric)
-            would = f"; --fabric {knit} would do, and --seams uv takes them" if knit else "; --seams uv takes them"
             notes.append(
-                f"{taken.describe()} were not taken, as {100 * beyond:.0f} % of the cloth would be beyond its limit{would}"
+                f"{taken.describe()} were not taken, as {100 * beyond:.0f} % of the cloth would be beyond its limit; "
+                f"{f'--fabric {knit} would do, and ' if knit else ''}--seams uv takes them"
             )
             taken, options = None, replace(options, find="auto", cuts=tuple(by_hand))
             found = find_seams(layers, options, fabric=fabric)
     if taken is not None:
-        if not of_file:
-            notes.insert(
-                0,
-                "islands of the texture were taken, as they look like cut pieces; --no uv leaves them, --seams none keeps it whole",
-            )
+        why = "islands of the texture were taken, as they look like cut pieces; --no uv leaves them, --seams none keeps it whole"
         found = _named_by_file(found, taken, read)
-    elif by_itself:
-        why = "one piece cannot lie flat, so its seams were found; --seams none keeps it whole"
-        if drawn:
-            why = "one piece cannot lie flat, so other seams were found, too; --seams none makes no others than you have drawn"
-        notes.insert(0, why)
-    return replace(found, notes=(*notes, *found.notes))
+        return replace(found, notes=(*(() if of_file else (why,)), *notes, *found.notes))
+    if not by_itself:
+        return replace(found, notes=(*notes, *found.notes))
+    why = "one piece cannot lie flat, so its seams were found; --seams none keeps it whole"
+    if drawn:
+        why = "one piece cannot lie flat, so other seams were found, too; --seams none makes no others than you have drawn"
+    return replace(found, notes=(why, *notes, *found.notes))
+
+
+def waist_of_body(path: Path, scale: float) -> tuple[float, float, float]:
+    """Return a place at the height of a body's waist [m], as its file has the body.
+
+    Args:
+        path: of a mesh of a standing body, which is where the garment is worn.
+        scale: metres per unit of the file.
+
+    Raises:
+        InputError: the file cannot be read as a mesh, or the mesh is no standing body.
+    """
+    from warpflat.flat import read_scan
+    from warpflat.garment import Slicer, common_body_of_scan, finer_body
+
+    vertices, faces = read_scan(path)
+    with errors_named(str(path)):
+        body = common_body_of_scan(vertices, faces, name=path.stem)
+    cut = Slicer(body.vertices, finer_body()[1]).cut(np.array([0.0, 1.0, 0.0]), body.level("waist"))
+    trunk = max((part.points for part in cut), key=lambda points: float(np.ptp(points[:, 0])))
+    x, y, z = (scale * ((trunk.mean(axis=0) - body.shift) @ np.linalg.inv(body.turn))).tolist()
+    return x, y, z
+
+
+def _asked_of_file(path: Path, find: str, seams: Mapping[str, FileSeams]) -> FileSeams:
+    """Return those of a file's seams that are asked for.
+
+    Raises:
+        InputError: the file has none of them, or too many for a pattern.
+    """
+    from warpflat.garment import FILE_SEAMS, MOST_ISLANDS
+
+    wanted = FILE_SEAMS if find == "file" else (find,)
+    taken = next((seams[way] for way in wanted if way in seams), None)
+    if taken is None:
+        lacks = {"uv": "texture coordinates", "materials": "more than one material", "groups": "more than one group"}
+        other = f"seams by {' and '.join(seams)}" if seams else "no other seams either"
+        raise InputError(
+            f"{path}: find = {find!r}: the file does not have {' or '.join(lacks[way] for way in wanted)}; it has {other}: "
+            'give find = "auto" (--seams auto) to look for seams'
+        )
+    if len(taken.names) > MOST_ISLANDS:
+        raise InputError(
+            f"{path}: find = {find!r}: {taken.describe()} are too many for a pattern, which has at most {MOST_ISLANDS} pieces; "
+            'find = "auto" (--seams auto) looks for seams'
+        )
+    return taken
 
 
 def _beyond_limit(pieces: Sequence[Surface], fabric: Fabric) -> float:
@@ -387,7 +397,8 @@ def plain_panel(scene: Scene) -> Surface | None:
 
     A file whose texture has several islands may bring its seams.
     """
-    from warpflat.flat import file_seams, read_mesh_file
+    from warpflat.flat import read_mesh_file
+    from warpflat.garment import file_seams
 
     settings, table = scene.settings, scene.settings.surface
     if not isinstance(table, FileSurface) or table.component is not None or settings.find_seams or settings.seams_cut:

@@ -228,8 +228,6 @@ def _largest_move(before: NDArray[np.float32], after: NDArray[np.float32]) -> fl
 
 # The file of the mannequin, to which that of the frames refers.
 MANNEQUIN = "mannequin.usdc"
-# The mannequin is shown this much smaller [m], so that cloth that lies on it is seen.
-_SHRUNK = 0.002
 
 # Frames of a film of 60: so many for a stage after the first one at least, and so many in which the line of a cut is shown.
 _LATER, _LINE = 15 / 60, 6 / 60
@@ -317,14 +315,12 @@ class Film:
                     break
             with FrameWriter(path, scale=scale) as writer:
                 if self._mannequin is not None:
-                    from warpflat.flat import vertex_normals
                     from warpflat.garment import Body, write_mannequin_usd
 
                     write_mannequin_usd(self._mannequin, self._folder / MANNEQUIN)
                     layout = self._mannequin.layout
-                    normals = vertex_normals(self._mannequin.vertices, layout.faces[layout.on_body])
-                    writer.refer_to_body(MANNEQUIN, self._mannequin.vertices - _SHRUNK * normals)
                     body = Body(self._mannequin.vertices, layout.faces[layout.on_body], device=wp.get_device("cpu"))
+                    writer.refer_to_body(MANNEQUIN, body.shrunk)
                 for name, surface in self._surfaces.items():
                     writer.add_piece(name, surface)
                 if self.drafted:

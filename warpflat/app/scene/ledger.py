@@ -7,7 +7,15 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from warpflat.app.scene.cuts import CutSequence, cut_of_dart, cuts_beside, flatten_and_cut, place_of, scene_with
+from warpflat.app.scene.cuts import (
+    CutSequence,
+    asked_cuts,
+    cut_of_dart,
+    cuts_beside,
+    flatten_and_cut,
+    place_of,
+    scene_with,
+)
 from warpflat.app.scene.form import scene_form, scene_recipe
 from warpflat.app.scene.load import Scene, errors_named, scene_relax_options
 from warpflat.app.scene.plan import GarmentPlan, flatten_surface, plan_garment, scene_cuts
@@ -169,7 +177,7 @@ def with_cut(scene: Scene, cut: Mapping[str, Any], mannequin: Mannequin | None =
         cut: a table of `[[cuts]]`.
         mannequin: the scene's, if it has been made.
     """
-    own = [table.model_dump(exclude_unset=True, by_alias=True) for table in scene.settings.cuts]
+    own = asked_cuts(scene)
     kept = [table for table in own if not (table.get("omit") and place_of(table) == place_of(cut))]
     if len(kept) < len(own):
         return scene_with(scene, cuts=kept)

@@ -67,14 +67,8 @@ def scene_finishing(tables: Sequence[FinishingTable]) -> list[Finishing]:
         width = usual if table.width_mm is None else 1e-3 * table.width_mm
         collar = None
         if table.kind in ("collar", "hood"):
-            collar = Collar(
-                style=table.style if table.kind == "collar" else "",
-                width=width,
-                rise=1e-3 * table.rise_mm,
-                fall=1e-3 * table.fall_mm,
-                point=1e-3 * table.point_mm,
-                strip=1e-3 * table.strip_mm,
-            )
+            style = table.style if table.kind == "collar" else ""
+            collar = Collar(style=style, width=width, **table.metres("rise", "fall", "point", "strip"))
         found.append(
             Finishing(
                 kind=table.kind,
@@ -82,14 +76,12 @@ def scene_finishing(tables: Sequence[FinishingTable]) -> list[Finishing]:
                 # A turtleneck is turned down upon itself.
                 width=2.0 * width if table.style == "turtleneck" else width,
                 share=table.share,
-                overlap=1e-3 * table.overlap_mm,
+                **table.metres("overlap", "placket", "pleat"),
                 shaped=table.shaped,
                 shorten={line: 1e-3 * mm for line, mm in table.shorten_mm.items()}
                 if isinstance(table.shorten_mm, dict)
                 else 1e-3 * table.shorten_mm,
                 elastic=table.elastic,
-                placket=1e-3 * table.placket_mm,
-                pleat=1e-3 * table.pleat_mm,
                 turns=table.turns,
                 collar=collar,
             )
@@ -103,12 +95,8 @@ def scene_pockets(tables: Sequence[PocketTable]) -> list[Pocket]:
         Pocket(
             kind=table.kind,
             where=table.piece if table.kind in ("patch", "welt") else table.seam,
-            width=1e-3 * table.width_mm,
-            height=1e-3 * table.height_mm,
             line=table.line,
-            below=1e-3 * table.below_mm,
-            from_centre=1e-3 * table.from_centre_mm,
-            welt=1e-3 * table.welt_mm,
+            **table.metres("width", "height", "below", "from_centre", "welt"),
             most_share=table.most_share or math.inf,
         )
         for table in tables

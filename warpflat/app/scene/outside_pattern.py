@@ -365,7 +365,6 @@ def drape_outside(
     from warpflat.core import optional_file, output_folder, remove_stale, report_activity
     from warpflat.flat import run_metrics
     from warpflat.garment import (
-        DrapeOptions,
         PatternOptions,
         Placement,
         drape_pattern,
@@ -378,7 +377,6 @@ def drape_outside(
     table, pattern = job.sewing.drape, job.pattern
     cloth, notes = _fabric(job, fabric)
     cloth = cloth.allowing(shear_limit)
-    options = DrapeOptions(friction=table.friction, tolerance=table.tolerance, max_steps=table.max_steps)
     usd = usd or table.usd
     names = ["metrics.json", "drape.png", "drape.webp", "frames.usdc", *(["worn.usdc"] if usd else [])]
     if correct:
@@ -391,7 +389,7 @@ def drape_outside(
                 top=job.sewing.top, lifts=lifts, size=size, spacing=1e-3 * job.sewing.spacing_mm, hold=table.hold
             )
             draped, more = drape_pattern(
-                pattern, job.body, fabric=cloth, placement=placement, options=options, device=device
+                pattern, job.body, fabric=cloth, placement=placement, options=table.options(), device=device
             )
         files, entry = write_drape_files(draped, folder, frames=True, usd=usd), draped.measures()
         if correct and not draped.converged:
@@ -400,21 +398,7 @@ def drape_outside(
             report_activity("correcting the pattern")
             with errors_named(str(job.path)):
                 found = relieve_pattern(draped, hold=table.hold)
-            entry["correction"] = {
-                "reason": found.reason,
-                "fabric": cloth.name,
-                "rounds": [
-                    {
-                        "misfit_m": each.misfit,
-                        "misfit_p95_m": each.misfit_p95,
-                        "beyond_limit": each.strained,
-                        "share": each.share,
-                    }
-                    for each in found.rounds
-                ],
-                "seam_difference_m": found.seam_difference(),
-                "edges": {},
-            }
+            entry["correction"] = found.measures()
             with optional_file(folder / "corrected.png", files) as path:
                 from warpflat.garment import write_correction_picture
 

@@ -5,25 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 from warpflat.app.scene.cuts import CutSequence, cut_of_dart, plan_automatic_cuts, plan_cuts
-from warpflat.app.scene.form import scene_form
+from warpflat.app.scene.form import scene_form, scene_mannequin
 from warpflat.app.scene.found_seams import found_seams, plain_panel, seams_entry
 from warpflat.app.scene.frames import FrameRecorder
 from warpflat.app.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
 from warpflat.app.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands
 from warpflat.app.scene.pattern_options import pattern_options
+from warpflat.app.scene.schema import PieceTable
 from warpflat.app.scene.seams import scene_constraints, scene_surface_seams, scene_wishes
 from warpflat.app.scene.surface import scene_pieces, scene_sewn_panels, scene_surface, with_piece_tables
 from warpflat.core import InputError, StepError, optional_step, report_activity
 from warpflat.flat import (
-    BorderSeam,
     Flattening,
     Progress,
     RelaxOptions,
-    SewnPanel,
     Surface,
     advise,
     as_fabric,
@@ -36,6 +34,7 @@ from warpflat.flat import (
 from warpflat.garment import (
     CURVES_MM,
     GRAIN,
+    BorderSeam,
     Constraint,
     FormGarment,
     FormResult,
@@ -45,6 +44,7 @@ from warpflat.garment import (
     Opening,
     PatternOptions,
     SeamWish,
+    SewnPanel,
     cap_wishes,
     check_edge_names,
     check_fold_grain,
@@ -53,7 +53,6 @@ from warpflat.garment import (
     find_fold_lines,
     flatten_form,
     garment_as_cut,
-    mannequin_from_table,
     name_seams,
     plan_form,
     seam_ratios,
@@ -67,7 +66,16 @@ from warpflat.garment import (
 if TYPE_CHECKING:
     from warpflat.pattern import Pattern
 
-__all__ = ["GarmentPlan", "MeshPlan", "flatten_surface", "plan_garment", "plan_mesh", "plan_scene", "scene_cuts"]
+__all__ = [
+    "GarmentPlan",
+    "MeshPlan",
+    "Plan",
+    "flatten_surface",
+    "plan_garment",
+    "plan_mesh",
+    "plan_scene",
+    "scene_cuts",
+]
 
 # How a note begins on pieces that cannot be sewn.
 _UNSEWN = "the pieces are not sewn, and their seams do not match: each lies as it does on its own"
@@ -76,35 +84,27 @@ _ALONE = 4000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class MeshPlan:
-    """A garment whose pieces are meshes: one, perhaps to be cut, or all of a file.
+class Plan:
+    """A garment, wherever its pieces come from. Who takes one does not ask for its kind.
 
     Attributes:
         scene: the scene.
         drawing: options of the pattern files.
-        sequences: the pieces, uncut, each with its cuts.
-        seams: those that the scene names.
-        found: seams that were found on a whole garment, which its pieces come from.
-        panels: of the sewn pattern that the file has, which is taken as it is.
         device: Warp device, before the scene's own.
+        mannequin: who wears it, if anybody does.
+        found: seams that were found on a whole garment, which its pieces come from.
     """
 
     scene: Scene
     drawing: PatternOptions
-    sequences: Sequence[CutSequence]
-    seams: Sequence[BorderSeam] = ()
-    found: FoundSeams | None = None
-    panels: Sequence[SewnPanel] = ()
     device: str | None = None
-
-    @property
-    def mannequin(self) -> None:
-        """Nobody wears a mesh."""
+    mannequin: Mannequin | None = None
+    found: FoundSeams | None = None
 
     @property
     def surfaces(self) -> list[Surface]:
         """The pieces in space, uncut."""
-        return [sequence.surface for sequence in self.sequences]
+        raise NotImplementedError
 
     def flatten(
         self,
@@ -121,6 +121,72 @@ class MeshPlan:
         Raises:
             InputError: a piece cannot be flattened, or a seam or a constraint asks what it cannot be.
         """
+        raise NotImplementedError
+
+    def in_cloth(self, scene: Scene) -> Plan:
+        """Return the same garment as another scene has it, which differs in its fabric; its pieces have the same points.
+
+        Raises:
+            InputError: the fabric is wrong.
+        """
+        raise NotImplementedError
+
+    def advise(self, piece: Flattening) -> Flattening:
+        """Return a piece with cuts that would help where it does not fit."""
+        return advise(piece)
+
+    def notes(self, garment: Garment) -> list[str]:
+        """Return what is told of the garment besides."""
+        return []
+
+    def further_metrics(self, garment: Garment) -> dict[str, Any]:
+        """Return the entries of `metrics.json` that the garment does not know."""
+        return {}
+
+    def place_drafted(self, garment: Garment, pattern: Pattern) -> Mapping[str, Sequence[Surface]]:
+        """Return what of a pattern has no surface, such as collars, where it is worn, by piece."""
+        return {}
+
+    @property
+    def size(self) -> str:
+        """The size of who wears it."""
+        return ""
+
+    def other_sizes(self) -> dict[str, Plan]:
+        """Return the garment in the sizes that its pattern has besides its own.
+
+        Raises:
+            InputError: there is no such size, or the pieces cannot be made in it.
+        """
+        return {}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeshPlan(Plan):
+    """A garment whose pieces are meshes: one, perhaps to be cut, or all of a file.
+
+    Attributes:
+        sequences: the pieces, uncut, each with its cuts.
+        seams: those that the scene names.
+        panels: of the sewn pattern that the file has, which is taken as it is.
+    """
+
+    sequences: Sequence[CutSequence]
+    seams: Sequence[BorderSeam] = ()
+    panels: Sequence[SewnPanel] = ()
+
+    @property
+    def surfaces(self) -> list[Surface]:
+        """The pieces in space, uncut."""
+        return [sequence.surface for sequence in self.sequences]
+
+    def flatten(
+        self,
+        *,
+        callback: Callable[[str, Progress], bool | None] | None = None,
+        recorders: Mapping[str, FrameRecorder] | None = None,
+    ) -> Garment:
+        """See :meth:`Plan.flatten`."""
         scene, settings, relax = self.scene, self.scene.settings, scene_relax_options(self.scene)
         tables = settings.pieces
         names, recorders = [surface.name for surface in self.surfaces], recorders or {}
@@ -130,29 +196,22 @@ class MeshPlan:
                 step = steps[names[0]]
                 pieces = [flatten_surface(scene, self.surfaces[0], relax, callback=step, device=self.device)]
             else:
+                options, own = flatten_options(scene, self.device), [tables.get(name, PieceTable()) for name in names]
+                if self.found is not None and self.found.seams:
+                    # How a piece would lie alone is where sewing begins: it need not be known to the last where it is found slowly.
+                    options["relax"] = replace(relax, max_steps=min(_ALONE, relax.max_steps))
+                options["grain_angle"] = [
+                    settings.grain_angle if table.grain_angle is None else table.grain_angle for table in own
+                ]
+                # Pieces of a garment whose seams were found know how their grain runs.
+                options["datum"] = [
+                    table.datum or (GRAIN if GRAIN in surface.lines else None)
+                    for table, surface in zip(own, self.surfaces, strict=True)
+                ]
                 pieces = flatten_all(
                     self.surfaces,
-                    fabric=scene_fabric(scene),
-                    # Pieces of a garment whose seams were found know how their grain runs.
-                    datum=[
-                        datum or (GRAIN if GRAIN in surface.lines else None)
-                        for surface in self.surfaces
-                        for datum in [None if surface.name not in tables else tables[surface.name].datum]
-                    ],
-                    grain_angle=[
-                        settings.grain_angle
-                        if surface.name not in tables or tables[surface.name].grain_angle is None
-                        else float(tables[surface.name].grain_angle or 0.0)
-                        for surface in self.surfaces
-                    ],
-                    model=settings.model,
-                    wear=scene_wear(scene),
-                    # How a piece would lie alone is where sewing begins: it need not be known to the last where it is found slowly.
-                    relax=replace(relax, max_steps=min(_ALONE, relax.max_steps))
-                    if self.found and self.found.seams
-                    else relax,
                     callback=None if callback is None else lambda number, progress: callback(names[number], progress),
-                    device=self.device or settings.device,
+                    **options,
                 )
             for place, (name, sequence) in enumerate(zip(names, self.sequences, strict=True)):
                 recorder = recorders.get(name)
@@ -190,9 +249,9 @@ class MeshPlan:
             garment, remarks=(*unsewn, *found, *(note for sequence in self.sequences for note in sequence.notes))
         )
 
-    def advise(self, piece: Flattening) -> Flattening:
-        """Return a piece with cuts that would help where it does not fit."""
-        return advise(piece)
+    def in_cloth(self, scene: Scene) -> MeshPlan:
+        """See :meth:`Plan.in_cloth`; cuts that were found automatically are all made."""
+        return replace(self, scene=scene, sequences=[replace(sequence, auto=None) for sequence in self.sequences])
 
     def notes(self, garment: Garment) -> list[str]:
         """Return what is told of the garment besides: borders that may have been forgotten."""
@@ -200,48 +259,30 @@ class MeshPlan:
         return [] if self.found is not None else unsewn_notes(garment)
 
     def further_metrics(self, garment: Garment) -> dict[str, Any]:
-        """Return the entries of `metrics.json` that the garment does not know: the seams that were found."""
+        """See :meth:`Plan.further_metrics`: the seams that were found."""
         if self.found is None:
             return {}
         return {"garment": seams_entry(self.found, list(garment.pieces.values()), self.drawing.rules.seam)}
 
-    def place_drafted(self, garment: Garment, pattern: Pattern) -> Mapping[str, Sequence[Surface]]:
-        """Return what of a pattern has no surface, such as collars, where it is worn, by piece: nothing, as nobody wears a mesh."""
-        return {}
-
-    @property
-    def size(self) -> str:
-        """A mesh has no size."""
-        return ""
-
-    def other_sizes(self) -> dict[str, GarmentPlan]:
-        """A mesh has one size."""
-        return {}
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class GarmentPlan:
+class GarmentPlan(Plan):
     """A garment whose pieces are a form on a mannequin.
 
     Attributes:
-        scene: the scene.
-        mannequin, form: the body, and the pieces on it.
-        drawing: options of the pattern files.
+        form: the pieces on the mannequin.
         wishes: fullness and gathers of seams.
         constraints: on edges and lines.
         openings: along seams.
         settings: further arguments of :func:`warpflat.garment.construction.garment.flatten_form`.
     """
 
-    scene: Scene
     mannequin: Mannequin
     form: FormResult
-    drawing: PatternOptions
     wishes: Sequence[SeamWish]
     constraints: Sequence[Constraint]
     openings: Sequence[Opening]
     settings: Mapping[str, Any]
-    found: ClassVar[None] = None
 
     @property
     def surfaces(self) -> list[Surface]:
@@ -255,11 +296,7 @@ class GarmentPlan:
         recorders: Mapping[str, FrameRecorder] | None = None,
         known: Mapping[str, Flattening] | None = None,
     ) -> FormGarment:
-        """Flatten and sew the garment; as :meth:`MeshPlan.flatten`, `known` as :func:`warpflat.flatten_form` takes it.
-
-        Raises:
-            InputError: as :func:`warpflat.flatten_form`.
-        """
+        """See :meth:`Plan.flatten`; `known` as :func:`warpflat.flatten_form` takes it."""
         with errors_named(self.scene.where):
             flattened = partial(
                 flatten_form,
@@ -290,6 +327,10 @@ class GarmentPlan:
             remarks=(*unsewn, *garment.remarks),
         )
 
+    def in_cloth(self, scene: Scene) -> GarmentPlan:
+        """See :meth:`Plan.in_cloth`."""
+        return plan_garment(scene, device=self.device)
+
     @cached_property
     def bricks(self) -> dict[str, list[str]]:
         """The bricks of every piece, on both sides of the body."""
@@ -309,18 +350,14 @@ class GarmentPlan:
             remedies.append(replace(remedy, table=table))
         return advised.with_remedies(remedies) if remedies else advised
 
-    def notes(self, garment: Garment) -> list[str]:
-        """Return what is told of the garment besides: nothing."""
-        return []
-
     def further_metrics(self, garment: Garment) -> dict[str, Any]:
-        """Return the entries of `metrics.json` that the garment does not know: how the scene gives its body."""
+        """See :meth:`Plan.further_metrics`: how the scene gives its body."""
         table = self.scene.settings.mannequin
         assert table is not None
         return {"mannequin": {**self.mannequin.metrics(), "table": table.model_dump(exclude_defaults=True)}}
 
     def place_drafted(self, garment: Garment, pattern: Pattern) -> Mapping[str, Sequence[Surface]]:
-        """Return what of a pattern has no surface, such as collars, where it is worn, by piece."""
+        """See :meth:`Plan.place_drafted`."""
         from warpflat.garment import place_drafted, surface_lift
 
         lifts = {
@@ -335,18 +372,13 @@ class GarmentPlan:
         table = self.scene.settings.mannequin
         return "" if table is None else table.size_name
 
-    def other_sizes(self) -> dict[str, GarmentPlan]:
-        """Return the garment in the sizes that its pattern has besides the mannequin's own.
-
-        Raises:
-            InputError: there is no such size, or the form cannot be built on it.
-        """
-        table, found = self.scene.settings.mannequin, {}
+    def other_sizes(self) -> dict[str, Plan]:
+        """See :meth:`Plan.other_sizes`."""
+        found = dict[str, Plan]()
         for size in self.scene.settings.pattern.sizes:
-            if table is not None and size != table.size:
+            if size != self.size:
                 with errors_named(f"{self.scene.where}: pattern.sizes"):
-                    body = mannequin_from_table(table.model_copy(update={"size": size}), path_of=Path)
-                    body, form = scene_form(self.scene, body)
+                    body, form = scene_form(self.scene, scene_mannequin(self.scene, size=size))
                 found[size] = replace(self, mannequin=body, form=form)
         return found
 
@@ -357,7 +389,7 @@ def plan_scene(
     device: str | None = None,
     cuts: CutSequence | None = None,
     built: tuple[Mannequin, FormResult] | None = None,
-) -> MeshPlan | GarmentPlan:
+) -> Plan:
     """Check what a scene asks of its garment, wherever its pieces come from; see :func:`plan_mesh` and :func:`plan_garment`.
 
     Raises:
@@ -467,22 +499,28 @@ def flatten_surface(
     """
     settings, start = scene.settings, None
     if settings.start is not None:
-        from warpflat.flat import read_layout
+        from warpflat.app.scene.read_layout import read_layout
 
         with errors_named(f"{scene.where}: start"):
             start = read_layout(scene.folder / expand_variables(settings.start))
-    return flatten(
-        surface,
-        fabric=scene_fabric(scene),
-        datum=settings.datum,
-        grain_angle=settings.grain_angle,
-        model=settings.model,
-        wear=scene_wear(scene),
-        start=start,
-        relax=relax,
-        callback=callback,
-        device=device or settings.device,
-    )
+    options = {**flatten_options(scene, device), "relax": relax}
+    return flatten(surface, datum=settings.datum, start=start, callback=callback, **options)
+
+
+def flatten_options(scene: Scene, device: str | None = None) -> dict[str, Any]:
+    """Return what a scene says of how each piece is flattened, as :func:`warpflat.flatten` takes it.
+
+    Raises:
+        InputError: the fabric or a setting is wrong.
+    """
+    return {
+        "fabric": scene_fabric(scene),
+        "grain_angle": scene.settings.grain_angle,
+        "model": scene.settings.model,
+        "wear": scene_wear(scene),
+        "relax": scene_relax_options(scene),
+        "device": device or scene.settings.device,
+    }
 
 
 def plan_garment(
@@ -498,8 +536,7 @@ def plan_garment(
     Raises:
         InputError: the body, the form, the fabric, a seam, a constraint, an edge of the pattern or a setting is wrong.
     """
-    settings = scene.settings
-    relax, fabric = scene_relax_options(scene), scene_fabric(scene)
+    settings, options = scene.settings, flatten_options(scene, device)
     report_activity("building the mannequin")
     mannequin, form = built or scene_form(scene)
     with errors_named(f"{scene.where}: pattern"):
@@ -518,7 +555,7 @@ def plan_garment(
     wishes = scene_wishes(settings.seams)
     with errors_named(f"{scene.where}: seams"):
         seam_ratios(form, wishes)
-        wishes += cap_wishes(form, as_fabric(fabric), wishes)
+        wishes += cap_wishes(form, as_fabric(options["fabric"]), wishes)
     with errors_named(scene.where):
         constraints = scene_constraints(
             settings.constraints,
@@ -528,19 +565,12 @@ def plan_garment(
     constraints += [each for each in straight_stands(form, openings) if each not in constraints]
     return GarmentPlan(
         scene=scene,
+        drawing=drawing,
+        device=device,
         mannequin=mannequin,
         form=form,
-        drawing=drawing,
         wishes=wishes,
         constraints=constraints,
         openings=openings,
-        settings={
-            "fabric": fabric,
-            "grain_angle": settings.grain_angle,
-            "curves_mm": CURVES_MM if settings.curves_mm is None else settings.curves_mm,
-            "model": settings.model,
-            "wear": scene_wear(scene),
-            "relax": relax,
-            "device": device or settings.device,
-        },
+        settings={**options, "curves_mm": CURVES_MM if settings.curves_mm is None else settings.curves_mm},
     )

@@ -17,7 +17,7 @@ from warpflat.app.scene.drape import drape_names, write_drape
 from warpflat.app.scene.form_shaping import ClosedDarts, require_open_darts, settle_shape
 from warpflat.app.scene.frames import MANNEQUIN, Film
 from warpflat.app.scene.load import Scene
-from warpflat.app.scene.plan import GarmentPlan, MeshPlan, plan_scene
+from warpflat.app.scene.plan import Plan, plan_scene
 from warpflat.app.scene.schema import FileSurface
 from warpflat.core import (
     Beside,
@@ -130,7 +130,7 @@ def files_of_run(scene: Scene) -> list[str]:
 
 
 def _run(
-    plan: MeshPlan | GarmentPlan,
+    plan: Plan,
     folder: Path,
     *,
     on_progress: Callable[[Progress], bool | None] | None,
@@ -231,7 +231,7 @@ def _run(
     )
 
 
-def _drafted(plan: MeshPlan | GarmentPlan, garment: Garment) -> list[DraftedOutline]:
+def _drafted(plan: Plan, garment: Garment) -> list[DraftedOutline]:
     """Return the pieces that finishing and pockets add, and where those of a form are worn."""
     from warpflat.garment import pattern_of_garment
     from warpflat.pattern import DraftedOutline
@@ -258,7 +258,7 @@ def _drafted(plan: MeshPlan | GarmentPlan, garment: Garment) -> list[DraftedOutl
 
 
 def _measure_fit(
-    plan: MeshPlan | GarmentPlan, garment: Garment, folder: Path
+    plan: Plan, garment: Garment, folder: Path
 ) -> tuple[dict[str, Any], tuple[str, ...], dict[str, tuple[Remedy, ...]], list[str]]:
     """Measure a garment, look for cuts that would help it, and draw how it is worn, if that was asked for or its cloth is stretched.
 
@@ -277,7 +277,7 @@ def _measure_fit(
     return measured, advised.notes, remedies, files
 
 
-def _draft(plan: MeshPlan | GarmentPlan, sizes: Mapping[str, Garment], folder: Path) -> WrittenPattern:
+def _draft(plan: Plan, sizes: Mapping[str, Garment], folder: Path) -> WrittenPattern:
     """Write the files of the pattern in all sizes, and the picture of a form's seams, which is among the files that are returned."""
     scene, wanted = plan.scene, plan.scene.settings.pattern.sizes
     if set(sizes) == set(wanted):

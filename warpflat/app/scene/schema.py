@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeVar, get_type_hints
 
 from pydantic import (
     AfterValidator,
@@ -16,9 +17,13 @@ from pydantic import (
     model_validator,
 )
 
+from warpflat.app.scene.first_shapes import PIECES
 from warpflat.core import Table, is_number, plain_name, quote_value
-from warpflat.flat import DEFAULT_FABRIC, FORMER_SOLVERS, PIECES, FabricTable, RelaxOptions, Solver
+from warpflat.flat import DEFAULT_FABRIC, FORMER_SOLVERS, FabricTable, RelaxOptions, Solver
 from warpflat.garment import MannequinTable
+
+if TYPE_CHECKING:
+    from warpflat.garment import DrapeOptions
 
 __all__ = [
     "AutoCutTable",
@@ -27,19 +32,20 @@ __all__ = [
     "ConstraintTable",
     "CutTable",
     "FileSurface",
+    "FindSeamsTable",
     "FinishingTable",
     "LineTable",
     "MarkerTable",
     "OpeningTable",
     "OutputTable",
     "PatternTable",
+    "PieceTable",
     "PocketTable",
     "SceneTable",
     "SeamCutTable",
     "SeamTable",
     "ShapeSurface",
     "kind_of_surface",
-    "text_or_table",
 ]
 
 
@@ -51,6 +57,13 @@ PointOrVertex = Annotated[
     Annotated[Point, Tag("point")] | Annotated[Vertex, Tag("vertex")],
     Discriminator(lambda value: "point" if isinstance(value, list) else "vertex"),
 ]
+
+# A text, or something that is none.
+Other = TypeVar("Other")
+_TEXT = Discriminator(lambda value: "text" if isinstance(value, str) else "other")
+TextOr = Annotated[Annotated[str, Tag("text")] | Annotated[Other, Tag("other")], _TEXT]
+CutName = Annotated[str, Field(max_length=100), AfterValidator(lambda name: plain_name(name, " _.+-"))]
+Points = Annotated[list[Point], Field(min_length=2)]
 
 
 class PlaneTable(Table):
@@ -64,12 +77,15 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class CutPlane(PlaneTable):
-    """A plane through a point [m], as given and all through; of several curves the nearest to the point.
+    """A plane by a point on it [m] and its normal (any length), along which a piece or a garment is cut.
 
-    With `towards` only the part from the point, which then lies on the piece, in that direction to the border.
+    Of a piece, of several curves the nearest to the point is cut, all through; with `towards` only the part from the point, which then
+    lies on the piece, in that direction to the border. Of a garment all curves in which the plane meets it are cut; with `towards` only
+    those in the half of the plane that lies in this direction from the point, with `nearest` only the one that is the nearest to it.
     """
 
     towards: Point | None = None
+    nearest: bool = False
 
 
 class CutTable(Table):
@@ -89,7 +105,7 @@ class CutTable(Table):
     `shape` has there.
     """
 
-    name: Annotated[str, Field(max_length=100), AfterValidator(lambda name: plain_name(name, " _.+-"))] | None = None
+    name: CutName | None = None
     line: str | None = None
     part: Annotated[list[Share], Field(min_length=2, max_length=2)] | None = None
     from_: PointOrVertex | None = Field(default=None, alias="from")
@@ -159,6 +175,8 @@ class CutTable(Table):
             raise ValueError("part takes a part of a line; give line")
         if self.through and self.from_ is None:
             raise ValueError("through lists places between from and to; give both")
+        if self.plane is not None and self.plane.nearest:
+            raise ValueError("plane: of a piece the nearest curve is cut anyway; leave nearest out")
         return self
 
 
@@ -183,10 +201,6 @@ def _as_component(value: Any) -> Any:
 
 Direction = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Component = Annotated[Literal["largest", "all"] | int, BeforeValidator(_as_component)]
-
-
-def text_or_table(value: Any) -> str:
-    return "text" if isinstance(value, str) else "table"
 
 
 class FileSurface(Table):
@@ -241,20 +255,8 @@ class LineTable(Table):
     from_: PointOrVertex | None = Field(default=None, alias="from")
     to: PointOrVertex | None = None
     plane: PlaneTable | None = None
-    border: (
-        Annotated[
-            Annotated[str, Tag("text")] | Annotated[BorderTable, Tag("table")],
-            Discriminator(text_or_table),
-        ]
-        | None
-    ) = None
-    curve: (
-        Annotated[
-            Annotated[str, Tag("text")] | Annotated[list[Point], Field(min_length=2), Tag("points")],
-            Discriminator(lambda value: "text" if isinstance(value, str) else "points"),
-        ]
-        | None
-    ) = None
+    border: TextOr[BorderTable] | None = None
+    curve: TextOr[Points] | None = None
 
     @model_validator(mode="after")
     def _one_way(self) -> LineTable:
@@ -331,17 +333,6 @@ class FindSeamsTable(Table):
     """A mesh file of the body under the garment, in the same place and unit: a seam at the waist is made at the body's waist."""
 
 
-class SeamCutPlane(PlaneTable):
-    """A plane by a point on it [m] and its normal (any length); all curves in which it meets the garment are cut.
-
-    With `towards` only the half of it that lies in this direction from the point, with `nearest` only the curve that is the nearest to
-    the point.
-    """
-
-    towards: Point | None = None
-    nearest: bool = False
-
-
 class SeamCutTable(Table):
     """A seam of a whole garment that you draw (see `warpflat.SeamCut`), in one of five ways.
 
@@ -351,26 +342,13 @@ class SeamCutTable(Table):
     the file has. Tables with one `name` are one seam. All are made at once, whatever their order.
     """
 
-    name: Annotated[str, Field(max_length=100), AfterValidator(lambda name: plain_name(name, " _.+-"))] | None = None
+    name: CutName | None = None
     points: Annotated[list[PointOrVertex], Field(min_length=2)] | None = None
-    line: (
-        Annotated[
-            Annotated[str, Tag("text")] | Annotated[list[Point], Field(min_length=2), Tag("points")],
-            Discriminator(lambda value: "text" if isinstance(value, str) else "points"),
-        ]
-        | None
-    ) = None
+    line: TextOr[Points] | None = None
     closed: bool = False
     """Points and lines return to their first point."""
-    plane: SeamCutPlane | None = None
-    edges: (
-        Annotated[
-            Annotated[str, Tag("text")]
-            | Annotated[list[Annotated[list[Vertex], Field(min_length=2)]], Field(min_length=1), Tag("rows")],
-            Discriminator(lambda value: "text" if isinstance(value, str) else "rows"),
-        ]
-        | None
-    ) = None
+    plane: CutPlane | None = None
+    edges: TextOr[Annotated[list[Annotated[list[Vertex], Field(min_length=2)]], Field(min_length=1)]] | None = None
     marked: bool = False
 
     @model_validator(mode="after")
@@ -396,8 +374,8 @@ class ConstraintTable(Table):
     straight: Literal["free", "warp", "weft"] | None = None
     length_mm: (
         Annotated[
-            Annotated[Literal["body"], Tag("word")] | Annotated[float, Field(ge=1, le=20_000), Tag("number")],
-            Discriminator(lambda value: "word" if isinstance(value, str) else "number"),
+            Annotated[Literal["body"], Tag("text")] | Annotated[float, Field(ge=1, le=20_000), Tag("other")],
+            _TEXT,
         ]
         | None
     ) = None
@@ -432,6 +410,12 @@ class DrapeTable(Table):
     """Another cloth for the corrected pattern, in which it is to be worn in the same shape."""
     usd: bool = False
     """Whether the worn garment is written as one mesh with its pattern, `worn.usdc`, as Style3D has it."""
+
+    def options(self) -> DrapeOptions:
+        """Return how the garment comes to rest."""
+        from warpflat.garment import DrapeOptions
+
+        return DrapeOptions(friction=self.friction, tolerance=self.tolerance, max_steps=self.max_steps)
 
 
 class OutputTable(Table):
@@ -475,7 +459,22 @@ class PatternTable(Table):
     """More sizes of a mannequin's garment, flattened too and laid upon each other as a graded nest."""
 
 
-class OpeningTable(Table):
+class OfKind(Table):
+    """A table with a `kind`, some keys of which belong to some kinds only."""
+
+    of_kinds: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+
+    @model_validator(mode="after")
+    def _belongs_to_its_kind(self) -> Self:
+        kind = getattr(self, "kind", "")
+        for key, kinds in self.of_kinds.items():
+            if key in self.model_fields_set and kind not in kinds:
+                words = " or ".join(kinds) if kinds == ("buttons",) else f"a {' or '.join(kinds)}"
+                raise ValueError(f"{key} belongs to {words}; leave it out for a {kind}")
+        return self
+
+
+class OpeningTable(OfKind):
     """An opening along a line of a form. A piece that runs across a centre line is parted there, with a seam below the opening.
 
     A `zip`, `buttons` and a `keyhole` are measured from the upper end of the line, a `slit`, `vent` or `godet` from the lower one. Buttons
@@ -484,6 +483,12 @@ class OpeningTable(Table):
     the lower end of its seam.
     """
 
+    of_kinds: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        **dict.fromkeys(("start_mm", "style"), ("zip",)),
+        "length_share": ("zip", "buttons"),
+        **dict.fromkeys(("button_mm", "spacing_mm", "count", "facing", "facing_mm"), ("buttons",)),
+        "tie_mm": ("wrap",),
+    }
     kind: Literal["zip", "buttons", "wrap", "slit", "vent", "godet", "keyhole"]
     seam: Annotated[str, Field(min_length=1, max_length=100)]
     length_mm: Annotated[float, Field(ge=10, le=2000)] | None = None
@@ -509,11 +514,7 @@ class OpeningTable(Table):
     def _fits_its_kind(self) -> OpeningTable:
         if self.kind == "zip" and self.width_mm is not None:
             raise ValueError("width_mm is that of a slit's hem or a vent's flap; leave it out for a zip")
-        if self.kind != "zip" and (self.start_mm or "style" in self.model_fields_set):
-            raise ValueError(
-                "start_mm and style belong to a zip; a slit, vent or godet begins at the lower end of its seam"
-            )
-        if self.length_share is not None and (self.length_mm is not None or self.kind not in ("buttons", "zip")):
+        if self.length_share is not None and self.length_mm is not None:
             raise ValueError("length_share belongs to a zip or buttons without length_mm; leave one of them out")
         if self.kind not in ("buttons", "zip", "wrap") and self.length_mm is None:
             raise ValueError("length_mm is missing; only buttons, zips and wraps run all along their line without one")
@@ -526,31 +527,10 @@ class OpeningTable(Table):
             raise ValueError(
                 "width_mm of a godet is at most three times its length_mm: more than half a circle is a flounce"
             )
-        if self.kind != "wrap" and "tie_mm" in self.model_fields_set:
-            raise ValueError(f"tie_mm belongs to a wrap; leave it out for a {self.kind}")
-        own = {"button_mm", "spacing_mm", "count", "facing", "facing_mm"} & self.model_fields_set
-        if self.kind != "buttons" and own:
-            raise ValueError(f"{sorted(own)[0]} belongs to buttons; leave it out for a {self.kind}")
         return self
 
 
-#: Keys of a finishing that belong to some kinds only.
-_OF_KINDS = {
-    "share": ("band", "waistband", "cuff", "ruffle", "collar"),
-    "overlap_mm": ("waistband", "cuff"),
-    "shaped": ("waistband",),
-    "shorten_mm": ("band", "waistband", "cuff", "ruffle", "flounce", "hem"),
-    "elastic": ("casing", "band", "waistband"),
-    "placket_mm": ("cuff", "collar"),
-    "pleat_mm": ("ruffle",),
-    "turns": ("flounce",),
-    "style": ("collar",),
-    "rise_mm": ("collar",),
-    "fall_mm": ("collar",),
-    "point_mm": ("collar",),
-    "strip_mm": ("hood",),
-}
-#: And those of a collar to some styles only.
+#: Keys of a collar that belong to some styles only.
 _OF_STYLES = {
     "share": ("turtleneck",),
     "rise_mm": ("stand", "shirt"),
@@ -560,7 +540,7 @@ _OF_STYLES = {
 }
 
 
-class FinishingTable(Table):
+class FinishingTable(OfKind):
     """Pieces that finish free edges of a form, hems too: what they are follows from the lengths of the edges that they are sewn to.
 
     A `facing` repeats each piece. One straight strip along the whole edge is a `band` or rib, a `waistband`, a `cuff`, a `binding` or
@@ -568,6 +548,21 @@ class FinishingTable(Table):
     turned in from the edge itself, for an elastic. A `hem` has no piece: it is cut higher, by `shorten_mm`.
     """
 
+    of_kinds: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "share": ("band", "waistband", "cuff", "ruffle", "collar"),
+        "overlap_mm": ("waistband", "cuff"),
+        "shaped": ("waistband",),
+        "shorten_mm": ("band", "waistband", "cuff", "ruffle", "flounce", "hem"),
+        "elastic": ("casing", "band", "waistband"),
+        "placket_mm": ("cuff", "collar"),
+        "pleat_mm": ("ruffle",),
+        "turns": ("flounce",),
+        "style": ("collar",),
+        "rise_mm": ("collar",),
+        "fall_mm": ("collar",),
+        "point_mm": ("collar",),
+        "strip_mm": ("hood",),
+    }
     kind: Literal[
         "facing", "band", "waistband", "binding", "cuff", "ruffle", "flounce", "casing", "collar", "hood", "hem"
     ]
@@ -605,9 +600,6 @@ class FinishingTable(Table):
 
     @model_validator(mode="after")
     def _fits_its_kind(self) -> FinishingTable:
-        for key, kinds in _OF_KINDS.items():
-            if key in self.model_fields_set and self.kind not in kinds:
-                raise ValueError(f"{key} belongs to a {' or '.join(kinds)}; leave it out for a {self.kind}")
         for key, styles in _OF_STYLES.items() if self.kind == "collar" else ():
             if key in self.model_fields_set and self.style not in styles:
                 raise ValueError(
@@ -642,7 +634,7 @@ class FinishingTable(Table):
         return self
 
 
-class PocketTable(Table):
+class PocketTable(OfKind):
     """A pocket on both sides of the body: a `patch` or a `welt` on a piece, its place marked, bags in a seam (`inseam`), or an opening
     from the upper edge of a front to its seam (`hip`).
 
@@ -651,6 +643,7 @@ class PocketTable(Table):
     a hip pocket runs from `width_mm` beside the seam, on the upper edge, to `height_mm` below it.
     """
 
+    of_kinds: ClassVar[Mapping[str, tuple[str, ...]]] = {"most_share": ("patch", "welt"), "welt_mm": ("welt",)}
     kind: Literal["patch", "welt", "inseam", "hip"]
     piece: Annotated[str, Field(max_length=100)] = ""
     line: Annotated[str, Field(max_length=100)] = "hip"
@@ -671,10 +664,6 @@ class PocketTable(Table):
             raise ValueError(f'a {self.kind} pocket needs its piece: piece = "front"')
         if self.kind in ("inseam", "hip") and (not self.seam or self.below_mm < 0):
             raise ValueError(f'a pocket of kind {self.kind} needs its seam, seam = "side left", and below_mm from 0')
-        if self.kind not in ("patch", "welt") and self.most_share is not None:
-            raise ValueError(f"most_share belongs to a patch or welt; leave it out for a pocket of kind {self.kind}")
-        if self.kind != "welt" and "welt_mm" in self.model_fields_set:
-            raise ValueError(f"welt_mm belongs to a welt; leave it out for a pocket of kind {self.kind}")
         return self
 
 
@@ -725,21 +714,44 @@ else:
     RelaxTable = create_model("RelaxTable", __base__=Table, **_RELAX_FIELDS)
 
 
-#: Keys of a scene that change the pattern of a mesh.
+# Keys of a scene that change the pattern of a mesh.
 _CHANGES_PATTERN = (
     "lines", "cuts", "auto_cut", "pieces", "seams", "find_seams", "seams_cut", "constraints", "datum", "start", "grain_angle", "bands",
     "bands_shorter", "wear", "drape",
 )  # fmt: skip
+# Those that belong to one of several pieces.
+_OF_ONE_PIECE = ("lines", "datum", "start", "cuts", "auto_cut", "seams", "drape")
+# Those that a form has and a surface has not, with what is said where they are given there.
+_OF_FORM = {
+    "shape": "shape belongs to a form; on a [surface] give [[cuts]] or [auto_cut]",
+    **{
+        key: f"{key} belongs to a form's pieces; on a [surface] leave it out"
+        for key in ("openings", "finishing", "pockets", "curves_mm")
+    },
+    **{key: f"{key} belongs to a form; a [surface] is as large as its mesh" for key in ("pulled_on", "ease")},
+    "half": "half belongs to a form's pieces; on a [surface] give the half's mesh, and in [pattern] "
+    'kinds = { left = "fold" }',
+}
+# And those that a surface has and a form has not.
+_OF_SURFACE = {
+    **dict.fromkeys(
+        ("bands", "bands_shorter"),
+        "bands and bands_shorter are for pieces of a [surface]; a form's bands are its [[finishing]]",
+    ),
+    **{
+        key: f"{table} is for a garment from a file; a form has its own seams, and [[seams]] change them"
+        for key, table in (("find_seams", "[seams]"), ("seams_cut", "[[seams_cut]]"))
+    },
+    "pieces": "pieces is for pieces from a file; on a form give [[cuts]] with their piece",
+    **dict.fromkeys(("lines", "datum"), "lines and datum belong to a [surface]; a form's pieces have their own"),
+}
 
 
 class SceneTable(Table):
     """A scene file; `datum` names a line given here, one that the file or shape brings, or a side of the border."""
 
     name: Annotated[str, Field(max_length=100), AfterValidator(plain_name)] | None = None
-    fabric: Annotated[
-        Annotated[str, Tag("text")] | Annotated[FabricTable, Tag("table")],
-        Discriminator(text_or_table),
-    ] = DEFAULT_FABRIC
+    fabric: TextOr[FabricTable] = DEFAULT_FABRIC
     fabric_files: list[str] = Field(default_factory=list)
     shear_limit: float | None = None
     surface: (
@@ -750,13 +762,7 @@ class SceneTable(Table):
         | None
     ) = None
     mannequin: MannequinTable | None = None
-    form: (
-        Annotated[
-            Annotated[str, Tag("text")] | Annotated[dict[str, Any], Tag("table")],
-            Discriminator(text_or_table),
-        ]
-        | None
-    ) = None
+    form: TextOr[dict[str, Any]] | None = None
     """A form's name, or a table of your own (see `warpflat.form_from_mapping`)."""
     half: bool = False
     """Symmetric pieces as their left half, on the fold."""
@@ -812,102 +818,19 @@ class SceneTable(Table):
             del data["seams"]
         return data
 
+    def _is_given(self, key: str) -> bool:
+        """Return whether a key says anything but what holds without it."""
+        return bool(getattr(self, key) != type(self).model_fields[key].get_default(call_default_factory=True))
+
     @model_validator(mode="after")
-    def _consistent(self) -> SceneTable:
+    def _one_source(self) -> SceneTable:
         if (self.surface is None) == (self.mannequin is None):
             raise ValueError("a scene needs either a [surface] table or a [mannequin] table with a form")
         if (self.mannequin is None) != (self.form is None):
             raise ValueError('a mannequin and a form go together: [mannequin] size = "EU 38" and form = "basic_block"')
-        if self.mannequin is None:
-            # Refuse what belongs to the form on a mannequin.
-            if self.shape != "none":
-                raise ValueError("shape belongs to a form; on a [surface] give [[cuts]] or [auto_cut]")
-            for key in ("openings", "finishing", "pockets"):
-                if getattr(self, key):
-                    raise ValueError(f"{key} belongs to a form's pieces; on a [surface] leave it out")
-            if self.curves_mm is not None:
-                raise ValueError("curves_mm belongs to a form's pieces; on a [surface] leave it out")
-            if self.pulled_on:
-                raise ValueError("pulled_on belongs to a form; a [surface] is as large as its mesh")
-            if self.ease is not None:
-                raise ValueError("ease belongs to a form; a [surface] is as large as its mesh")
-            if isinstance(self.surface, FileSurface) and self.surface.pattern is not None:
-                for key in _CHANGES_PATTERN:
-                    if getattr(self, key) != type(self).model_fields[key].get_default(call_default_factory=True):
-                        name = {"find_seams": "seams"}.get(key, key)
-                        raise ValueError(
-                            f'{name} belongs to pieces that are flattened; with surface.pattern = "uv" the pattern is taken as it is: '
-                            "leave one of them out"
-                        )
-                if self.surface.component is not None:
-                    raise ValueError('surface.component: pattern = "uv" takes all islands of the texture; leave it out')
-            found = None if self.find_seams is None or self.find_seams.find == "none" else self.find_seams.find
-            whole = f'[seams] find = "{found}"' if found else "[[seams_cut]]" if self.seams_cut else None
-            if whole and not isinstance(self.surface, FileSurface):
-                raise ValueError(f"{whole} takes a garment from a file")
-            if (
-                isinstance(self.surface, FileSurface)
-                and self.surface.meet_mm is not None
-                and self.surface.component != "all"
-            ):
-                raise ValueError('surface.meet_mm is for component = "all"; leave it out')
-            if isinstance(self.surface, FileSurface) and (self.surface.component == "all" or whole):
-                if self.surface.component == "all" and self.seams_cut:
-                    raise ValueError('[[seams_cut]] cuts a whole garment; with component = "all" leave it out')
-                for key in ("lines", "datum", "start", "cuts", "auto_cut", "seams", "drape"):
-                    if getattr(self, key):
-                        why = whole or 'component = "all"'
-                        own = f", or give it to a piece: [pieces.NAME] {key}" if key in PieceTable.model_fields else ""
-                        raise ValueError(f"{key} belongs to one piece; with {why} leave it out{own}")
-            elif isinstance(self.surface, ShapeSurface) and self.surface.shape in PIECES:
-                for key in ("lines", "datum", "start", "cuts", "auto_cut", "seams", "drape", "constraints"):
-                    if getattr(self, key):
-                        raise ValueError(
-                            f'{key} belongs to one surface; shape = "{self.surface.shape}" has several pieces: leave it out'
-                        )
-            elif self.pieces and (self.find_seams is None or self.find_seams.find == "none"):
-                raise ValueError('[pieces] is for several pieces: of component = "all", or along seams that are found')
-            for where, cuts in (
-                ("", self.cuts),
-                *((f"pieces.{name}.", piece.cuts) for name, piece in self.pieces.items()),
-            ):
-                for number, cut in enumerate(cuts):
-                    cut.check_for_surface(f"{where}cuts[{number}]")
-            if self.half:
-                raise ValueError(
-                    "half belongs to a form's pieces; on a [surface] give the half's mesh, and in [pattern] "
-                    'kinds = { left = "fold" }'
-                )
-            for number, seam in enumerate(self.seams):
-                if seam.sides is None:
-                    raise ValueError(
-                        f"seams[{number}]: on a [surface] give the two lines that are sewn, "
-                        'sides = ["left", "right"]; both sides of its cuts are equally long anyway'
-                    )
-        else:
-            # Refuse what belongs to a surface.
-            if self.bands != "auto" or self.bands_shorter:
-                raise ValueError(
-                    "bands and bands_shorter are for pieces of a [surface]; a form's bands are its [[finishing]]"
-                )
-            if self.find_seams is not None or self.seams_cut:
-                raise ValueError(
-                    f"{'[seams]' if self.find_seams else '[[seams_cut]]'} is for a garment from a file; a form has its own "
-                    "seams, and [[seams]] change them"
-                )
-            if self.pieces:
-                raise ValueError("pieces is for pieces from a file; on a form give [[cuts]] with their piece")
-            if self.lines or self.datum:
-                raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
-            if self.auto_cut and self.shape == "auto":
-                raise ValueError('give [auto_cut] or shape = "auto"')
-            for number, cut in enumerate(self.cuts):
-                cut.check_for_form(f"cuts[{number}]")
-            for number, seam in enumerate(self.seams):
-                if seam.sides is not None:
-                    raise ValueError(
-                        f"seams[{number}]: sides belong to a [surface]; those of a form's seams are known: leave them out"
-                    )
+        for key, words in (_OF_FORM if self.mannequin is None else _OF_SURFACE).items():
+            if self._is_given(key):
+                raise ValueError(words)
         if self.pulled_on and self.wear is not None:
             raise ValueError(
                 "pulled_on makes a garment as wide as it must be, and [wear] as tight as is asked; give one of them"
@@ -919,10 +842,70 @@ class SceneTable(Table):
             raise ValueError(
                 "pattern.sizes are of the tables, as they are: leave out [mannequin.measurements], or pattern.sizes"
             )
+        if self.drape is not None and self.half:
+            raise ValueError("a drape needs the whole garment: leave out half, or [drape]")
         return self
 
     @model_validator(mode="after")
-    def _whole_drape(self) -> SceneTable:
-        if self.drape is not None and self.half:
-            raise ValueError("a drape needs the whole garment: leave out half, or [drape]")
+    def _fits_a_form(self) -> SceneTable:
+        if self.mannequin is None:
+            return self
+        if self.auto_cut and self.shape == "auto":
+            raise ValueError('give [auto_cut] or shape = "auto"')
+        for number, cut in enumerate(self.cuts):
+            cut.check_for_form(f"cuts[{number}]")
+        for number, seam in enumerate(self.seams):
+            if seam.sides is not None:
+                raise ValueError(
+                    f"seams[{number}]: sides belong to a [surface]; those of a form's seams are known: leave them out"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _fits_a_surface(self) -> SceneTable:
+        surface = self.surface
+        if surface is None:
+            return self
+        file = surface if isinstance(surface, FileSurface) else None
+        if file is not None and file.pattern is not None:
+            for key in _CHANGES_PATTERN:
+                if self._is_given(key):
+                    name = {"find_seams": "seams"}.get(key, key)
+                    raise ValueError(
+                        f'{name} belongs to pieces that are flattened; with surface.pattern = "uv" the pattern is taken as it is: '
+                        "leave one of them out"
+                    )
+            if file.component is not None:
+                raise ValueError('surface.component: pattern = "uv" takes all islands of the texture; leave it out')
+        found = None if self.find_seams is None or self.find_seams.find == "none" else self.find_seams.find
+        whole = f'[seams] find = "{found}"' if found else "[[seams_cut]]" if self.seams_cut else None
+        if whole and file is None:
+            raise ValueError(f"{whole} takes a garment from a file")
+        of_all_parts = file is not None and file.component == "all"
+        if file is not None and file.meet_mm is not None and not of_all_parts:
+            raise ValueError('surface.meet_mm is for component = "all"; leave it out')
+        if of_all_parts and self.seams_cut:
+            raise ValueError('[[seams_cut]] cuts a whole garment; with component = "all" leave it out')
+        if of_all_parts or whole:
+            for key in filter(self._is_given, _OF_ONE_PIECE):
+                why = whole or 'component = "all"'
+                own = f", or give it to a piece: [pieces.NAME] {key}" if key in PieceTable.model_fields else ""
+                raise ValueError(f"{key} belongs to one piece; with {why} leave it out{own}")
+        elif isinstance(surface, ShapeSurface) and surface.shape in PIECES:
+            for key in filter(self._is_given, (*_OF_ONE_PIECE, "constraints")):
+                raise ValueError(
+                    f'{key} belongs to one surface; shape = "{surface.shape}" has several pieces: leave it out'
+                )
+        elif self.pieces and not found:
+            raise ValueError('[pieces] is for several pieces: of component = "all", or along seams that are found')
+        of_pieces = ((f"pieces.{name}.", piece.cuts) for name, piece in self.pieces.items())
+        for where, cuts in (("", self.cuts), *of_pieces):
+            for number, cut in enumerate(cuts):
+                cut.check_for_surface(f"{where}cuts[{number}]")
+        for number, seam in enumerate(self.seams):
+            if seam.sides is None:
+                raise ValueError(
+                    f"seams[{number}]: on a [surface] give the two lines that are sewn, "
+                    'sides = ["left", "right"]; both sides of its cuts are equally long anyway'
+                )
         return self

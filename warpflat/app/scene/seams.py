@@ -6,8 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from warpflat.app.scene.schema import ConstraintTable, SeamTable
 from warpflat.core import InputError, nearest
-from warpflat.flat import BorderSeam
-from warpflat.garment import Constraint, FixedLength, SeamWish, Straight, Symmetric
+from warpflat.garment import BorderSeam, Constraint, FixedLength, SeamWish, Straight, Symmetric
 
 __all__ = ["scene_constraints", "scene_surface_seams", "scene_wishes"]
 

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from typing import Any
 
-from warpflat.core import InputError, laid_over, nearest
+from warpflat.app.scene.as_toml import laid_over
+from warpflat.core import InputError, nearest
 from warpflat.garment import (
     ARM_LEVELS,
     LEG_LEVELS,

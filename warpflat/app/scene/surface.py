@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from warpflat.app.scene.border import SIDES, line_on_border
 from warpflat.app.scene.load import Scene, errors_named, expand_variables
 from warpflat.app.scene.schema import (
     BorderTable,
@@ -15,20 +16,17 @@ from warpflat.app.scene.schema import (
 )
 from warpflat.core import InputError, IntArray, guarded, nearest
 from warpflat.flat import (
-    SIDES,
     RawMesh,
-    SewnPanel,
     Surface,
     line_between,
     line_from_curve,
     line_from_indices,
-    line_on_border,
     line_on_plane,
     read_mesh_file,
-    read_sewn_panels,
     surface_of_file,
     with_lines,
 )
+from warpflat.garment import SewnPanel, read_sewn_panels
 
 __all__ = ["scene_pieces", "scene_sewn_panels", "scene_surface", "with_piece_tables"]
 
@@ -40,13 +38,14 @@ def scene_surface(scene: Scene, read: tuple[Path, RawMesh, float, list[Path]] | 
         InputError: the file or shape is wrong, an environment variable is not set, or a line is not on the surface.
     """
     from warpflat.app.scene.seams import scene_surface_seams
-    from warpflat.flat import surface_seams
+    from warpflat.garment import surface_seams
 
     table = scene.settings.surface
     if table is None:
         raise InputError(f"{scene.where}: the scene has no [surface]; this needs one piece, not a garment")
     if isinstance(table, ShapeSurface):
-        from warpflat.flat import PIECES, make_shape
+        from warpflat.app.scene.first_shapes import PIECES
+        from warpflat.flat import make_shape
 
         with errors_named(f"{scene.where}: surface"):
             if table.shape in PIECES:
@@ -119,7 +118,8 @@ def scene_pieces(scene: Scene) -> tuple[Surface, ...] | None:
     Raises:
         InputError: the file or a parameter of the shape is wrong, or an environment variable is not set.
     """
-    from warpflat.flat import MEET, PIECES, make_pieces, read_pieces
+    from warpflat.app.scene.first_shapes import PIECES, make_pieces
+    from warpflat.flat import MEET, read_pieces
 
     table = scene.settings.surface
     if isinstance(table, ShapeSurface) and table.shape in PIECES:

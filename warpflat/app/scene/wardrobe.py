@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from warpflat.app.scene.as_toml import document_as_toml, laid_over
 from warpflat.app.scene.style import STYLE_KEYS, with_style
-from warpflat.core import InputError, check_table, document_as_toml, laid_over, nearest, read_toml
+from warpflat.core import InputError, check_table, nearest, read_toml
 from warpflat.garment import MannequinTable, mannequin_from_table
 
 __all__ = ["GarmentOffer", "garment_offer", "offer_tables", "offers", "scene_text", "style_of", "taken_options"]

@@ -17,7 +17,7 @@ from warpflat.core import FloatArray, InputError, IntArray, arc_lengths
 from warpflat.flat import Flattening, border_loops
 from warpflat.garment import FormDart, dart_along, is_part_of, select_bricks, usual_darts
 
-__all__ = ["cut_along", "cut_between", "cuttable_lines"]
+__all__ = ["cut_along", "cut_between", "cuttable_lines", "rounded"]
 
 # A point of a cut this near to the border means the border [m]; so near two points must lie to a line of a form.
 _TO_BORDER, _TO_LINE = 0.015, 0.03
@@ -107,7 +107,7 @@ def cut_between(solution: Solution, first: Hit, second: Hit) -> dict[str, Any]:
         raise InputError("both points lie at one place; click two that lie further apart")
     if solution.plan is None:
         return {
-            "name": _unused(solution.scene, "cut"), "from": _rounded(vertices[ends[0]]), "to": _rounded(vertices[ends[1]])
+            "name": _unused(solution.scene, "cut"), "from": rounded(vertices[ends[0]]), "to": rounded(vertices[ends[1]])
         }  # fmt: skip
     best: tuple[float, str, IntArray] | None = None
     for line, row in cuttable_lines(solution, first.piece).items():
@@ -151,7 +151,8 @@ def _border(piece: Flattening) -> set[int]:
     return {vertex for loop in border_loops(piece.surface.faces) for vertex in loop.tolist()}
 
 
-def _rounded(point: FloatArray) -> list[float]:
+def rounded(point: FloatArray) -> list[float]:
+    """Return a point [m] to the micrometre, as a scene has it."""
     return [round(float(value), 6) for value in point]
 
 

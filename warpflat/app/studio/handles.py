@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.app.scene.cuts import cut_of_dart, place_of
+from warpflat.app.scene.cuts import asked_cuts, cut_of_dart, place_of
 from warpflat.app.scene.plan import GarmentPlan
+from warpflat.app.studio.cut_tables import rounded
 from warpflat.app.studio.solve import Solution
 from warpflat.core import FloatArray, IntArray, arc_lengths, unit
 from warpflat.flat import Crack, border_loops, seam_kind, triangulate
-from warpflat.garment import FormDart, Neckline, PlacedDart, dart_part, select_bricks
+from warpflat.garment import FormDart, Mesh, Neckline, PlacedDart, dart_part, select_bricks
 
 __all__ = ["Handle", "pattern_handles"]
 
@@ -137,7 +138,7 @@ def _widen_mouth(plan: GarmentPlan, dart: PlacedDart, width: float, moved: float
 
 def _with_darts(plan: GarmentPlan, *darts: FormDart) -> dict[str, Any]:
     """Return the cuts of a scene with darts as they are asked for now."""
-    cuts = [table.model_dump(exclude_unset=True, by_alias=True) for table in plan.scene.settings.cuts]
+    cuts = asked_cuts(plan.scene)
     for dart in darts:
         at = next((k for k, table in enumerate(cuts) if place_of(table) == dart.place), len(cuts))
         cuts[at : at + 1] = [cut_of_dart(dart)]
@@ -235,7 +236,7 @@ def _move_end(
     """Return the cuts with one end of the cut of a number dragged from one place of the plane to another."""
     (piece,) = solution.pieces.values()
     surface, flat = piece.surface, np.asarray(piece.positions)
-    cuts = [table.model_dump(exclude_unset=True, by_alias=True) for table in solution.scene.settings.cuts]
+    cuts = asked_cuts(solution.scene)
     table = cuts[number]
     is_tip = seam.left[end] == seam.right[end]
     if is_tip and "line" in table:
@@ -262,31 +263,15 @@ def _move_end(
         known = {key: surface.vertices[place] if isinstance(place, int) else np.array(place) for key, place in places}
         moved_end = surface.vertices[seam.path[end]]
         key = min(known, key=lambda key: float(np.linalg.norm(known[key] - moved_end)))
-        cuts[number] = {**table, key: _rounded(point)}
+        cuts[number] = {**table, key: rounded(point)}
     else:
         name = table.get("name", table.get("line"))
-        cuts[number] = {"name": name, **{key: _rounded(ends[at]) for at, key in given}}
+        cuts[number] = {"name": name, **{key: rounded(ends[at]) for at, key in given}}
     return {"cuts": cuts}
-
-
-def _rounded(point: FloatArray) -> list[float]:
-    return [round(float(value), 6) for value in point]
 
 
 def _on_surface(vertices: FloatArray, faces: IntArray, flat: FloatArray, place: FloatArray) -> FloatArray:
     """Return the point of a surface (#V by 3 [m]) that lies at a place (2) of its pattern (#V by 2), or nearest to it."""
-    triangles, _ = triangulate(faces)
-    origin = flat[triangles[:, 0]]
-    first, second = flat[triangles[:, 1]] - origin, flat[triangles[:, 2]] - origin
-    area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    away = place - origin
-    scale = 1.0 / np.where(np.abs(area) < 1e-15, np.inf, area)
-    u = (away[:, 0] * second[:, 1] - away[:, 1] * second[:, 0]) * scale
-    v = (first[:, 0] * away[:, 1] - first[:, 1] * away[:, 0]) * scale
-    weights = np.column_stack([1.0 - u - v, u, v])
-    # The triangle around the place, or the one that it lies least outside of.
-    inside = np.clip(weights, 0.0, 1.0)
-    inside /= inside.sum(axis=1, keepdims=True)
-    found = np.einsum("ij,ijk->ik", inside, flat[triangles])
-    nearest = int(np.linalg.norm(found - place, axis=1).argmin())
-    return np.asarray(inside[nearest] @ vertices[triangles[nearest]])
+    triangles = triangulate(faces)[0].astype(np.int64)
+    nearest, weights, _ = Mesh(np.pad(flat, [(0, 0), (0, 1)]), triangles).closest(np.append(place, 0.0)[None])
+    return np.asarray(weights[0] @ vertices[triangles[nearest[0]]])

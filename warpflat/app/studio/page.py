@@ -21,7 +21,7 @@ from warpflat.app.studio.frame import PieceFrame
 from warpflat.app.studio.handles import Handle, pattern_handles
 from warpflat.app.studio.maps import MapScale, drape_gaps, drape_scale, piece_scale
 from warpflat.app.studio.messages import read_message
-from warpflat.app.studio.panel import Actions, Panel
+from warpflat.app.studio.panel import Panel
 from warpflat.app.studio.pick import Hit, nearest_line
 from warpflat.app.studio.save import free_name
 from warpflat.app.studio.session import Session, Step
@@ -93,16 +93,7 @@ class Page:
         self._dirty, self._closed, self._told, self._drawing = threading.Event(), False, True, False
         self.stage = Stage(self.server)
         self.server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
-        actions = Actions(
-            choose_map=self._choose_map,
-            choose_line=self._choose_line,
-            choose_mode=self._choose_mode,
-            try_again=self._try_part,
-            view=self.stage.show_all,
-            undo=lambda: self._go(self.session.undo),
-            redo=lambda: self._go(self.session.redo),
-        )
-        self._panel = Panel(self.server, self.session, actions, name=free_name(scene))
+        self._panel = Panel(self, name=free_name(scene))
         self.server.on_client_connect(self._greet)
         self.server.scene.on_click()(self._click)
         self._painter = threading.Thread(target=self._paint, name="painter", daemon=True)
@@ -259,10 +250,15 @@ class Page:
         )
         self._goes_on = True
 
-    def _go(self, undo_or_redo: Callable[[], None]) -> None:
-        """Undo or redo; what was picked is no longer of what is shown."""
+    def undo(self) -> None:
+        """Undo the last change; what was picked is no longer of what is shown."""
         self._picked, self._points = None, []
-        undo_or_redo()
+        self.session.undo()
+
+    def redo(self) -> None:
+        """Make the change again that was undone last."""
+        self._picked, self._points = None, []
+        self.session.redo()
 
     def _update_panel(self) -> None:
         solution = self.session.solution
@@ -293,7 +289,7 @@ class Page:
         shape = [0.0]
         if len(self.server.get_clients()) <= 1 and (self._picked is not None or self._points):
             # A page that was loaded again begins without marks.
-            self._choose_line(None)
+            self.choose_line(None)
 
         def follow(camera: viser.CameraHandle) -> None:
             if abs(camera.aspect - shape[0]) > 0.01 * camera.aspect:
@@ -322,13 +318,15 @@ class Page:
             if line is None:
                 self.session.tell('no line runs within 2 cm of the click; click nearer, or pick "two points"')
             else:
-                self._choose_line((hit.piece, line))
+                self.choose_line((hit.piece, line))
 
-    def _choose_mode(self, two_points: bool) -> None:
+    def choose_mode(self, two_points: bool) -> None:
+        """Let clicks pick two points, or lines."""
         self._two_points = two_points
-        self._choose_line(None)
+        self.choose_line(None)
 
-    def _choose_line(self, picked: tuple[str, str] | None) -> None:
+    def choose_line(self, picked: tuple[str, str] | None) -> None:
+        """Pick a line of a piece, and try a cut along it; None picks none."""
         self._picked, self._points = picked, []
         solution = self.session.solution
         if picked is None or solution is None:
@@ -336,7 +334,8 @@ class Page:
         else:
             self._try(lambda: cut_along(solution, *picked))
 
-    def _try_part(self, part: tuple[float, float]) -> None:
+    def try_part(self, part: tuple[float, float]) -> None:
+        """Try a cut along a part of the picked line, in shares of its length."""
         picked, solution = self._picked, self.session.solution
         if picked is None or solution is None:
             self.session.tell("pick a line first; the part is one of a line")
@@ -349,7 +348,8 @@ class Page:
         except InputError as error:
             self.session.tell(str(error))
 
-    def _choose_map(self, kind: str) -> None:
+    def choose_map(self, kind: str) -> None:
+        """Show a map, by its key in `MAPS`."""
         self._kind = kind
         if kind == "drape":
             self._drape_of = self.session.step

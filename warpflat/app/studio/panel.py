@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from html import escape
 from typing import Any
 from urllib.parse import quote
@@ -16,7 +15,7 @@ from warpflat.core import InputError, energy_words
 from warpflat.flat import load_library, relaxation_words
 from warpflat.garment import EASE_PRESETS, form_names, size_names, size_tables
 
-__all__ = ["Actions", "Panel", "preview_words"]
+__all__ = ["Panel", "preview_words"]
 
 _OWN = "(the scene's own)"
 _SHAPES = ("none", "darts", "princess", "auto")
@@ -26,45 +25,29 @@ _NO_LINE = "(click a line)"
 _LEAST_OVERLAP = 1e-6  # [m2], below which it is not reported
 
 
-@dataclass(frozen=True, kw_only=True)
-class Actions:
-    """What the page does for the panel, besides what the session does.
-
-    Attributes:
-        choose_map: called with a key of `MAPS`.
-        choose_line: called with a piece and a line, or with None.
-        choose_mode: called with True if two points are to be clicked.
-        try_again: called with the part of the line, in shares.
-        view: called with the client and the side from which it looks at the form [degrees].
-        undo, redo: go through the changes.
-    """
-
-    choose_map: Callable[[str], None]
-    choose_line: Callable[[tuple[str, str] | None], None]
-    choose_mode: Callable[[bool], None]
-    try_again: Callable[[tuple[float, float]], None]
-    view: Callable[[Any, float], None]
-    undo: Callable[[], None]
-    redo: Callable[[], None]
-
-
 class Panel:
-    """Builds the panel and keeps it as the session is."""
+    """Builds the panel of a page, and keeps it as the session is."""
 
-    def __init__(self, server: Any, session: Session, actions: Actions, *, name: str) -> None:
-        self._gui, self._session, self._actions = server.gui, session, actions
+    def __init__(self, page: Any, *, name: str) -> None:
+        """
+        Args:
+            page: the :class:`warpflat.app.studio.page.Page` that has it.
+            name: under which the scene is to be saved.
+        """
+        session: Session = page.session
+        self._gui, self._session = page.server.gui, session
         self._lines: dict[str, tuple[str, str]] = {}
         self._head = self._gui.add_html("")
         sides = {"Front": 0.0, "Left": 90.0, "Back": 180.0, "Right": 270.0}
         buttons = self._gui.add_button_group("look from", tuple(sides))
-        buttons.on_click(lambda event: self._actions.view(event.client, sides[event.target.value]))
-        acts = {"Undo": actions.undo, "Redo": actions.redo, "Stop": session.stop, "Watch": self._watch}
+        buttons.on_click(lambda event: page.stage.show_all(event.client, sides[event.target.value]))
+        acts = {"Undo": page.undo, "Redo": page.redo, "Stop": session.stop, "Watch": self._watch}
         _buttons(self._gui.add_button_group("do", tuple(acts)), acts)
         with self._gui.add_folder("Map"):
             self._kind = self._gui.add_dropdown("colours", tuple(MAPS.values()))
             self._legend = self._gui.add_html("")
         keys = {title: key for key, title in MAPS.items()}
-        _chosen(self._kind, lambda value: self._actions.choose_map(keys[value]))
+        _chosen(self._kind, lambda value: page.choose_map(keys[value]))
         with self._gui.add_folder("Cut"):
             self._mode = self._gui.add_dropdown("pick", ("a line", "two points"))
             self._line = self._gui.add_dropdown("line", (_NO_LINE,))
@@ -72,10 +55,10 @@ class Panel:
                 "part [%]", min=0, max=100, step=1, initial_value=(0, 100), min_range=2
             )
             self._made = self._gui.add_button_group("cut", ("Apply", "Leave it"))
-        _chosen(self._mode, lambda value: self._actions.choose_mode(value == "two points"))
-        _chosen(self._line, lambda value: self._actions.choose_line(self._lines.get(value)))
-        _chosen(self._part, lambda value: self._actions.try_again((0.01 * value[0], 0.01 * value[1])))
-        _buttons(self._made, {"Apply": session.apply, "Leave it": lambda: self._actions.choose_line(None)})
+        _chosen(self._mode, lambda value: page.choose_mode(value == "two points"))
+        _chosen(self._line, lambda value: page.choose_line(self._lines.get(value)))
+        _chosen(self._part, lambda value: page.try_part((0.01 * value[0], 0.01 * value[1])))
+        _buttons(self._made, {"Apply": session.apply, "Leave it": lambda: page.choose_line(None)})
         scene = session.scene
         with self._gui.add_folder("Cloth"):
             try:

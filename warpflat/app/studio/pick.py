@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.core import FloatArray, IntArray
+from warpflat.core import FloatArray, IntArray, nearest_on_polyline
 from warpflat.flat import triangulate
 
 __all__ = ["Hit", "nearest_line", "pick_flat", "pick_on_rays"]
@@ -98,10 +98,7 @@ def nearest_line(point: ArrayLike, vertices: FloatArray, lines: Mapping[str, Ite
     place, best = np.asarray(point, dtype=float), None
     for name, ids in lines.items():
         polyline = vertices[np.asarray(list(ids), dtype=np.int64)]
-        start, step = polyline[:-1], np.diff(polyline, axis=0)
-        length = np.maximum(np.einsum("ij,ij->i", step, step), 1e-30)
-        share = np.clip(np.einsum("ij,ij->i", place - start, step) / length, 0.0, 1.0)
-        away = float(np.linalg.norm(start + share[:, None] * step - place, axis=1).min())
+        away = float(np.linalg.norm(nearest_on_polyline(place, polyline) - place))
         if best is None or away < best[0]:
             best = away, name
     return None if best is None or best[0] > _NEAR_LINE else best[1]

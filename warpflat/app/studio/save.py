@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from warpflat.app.scene.as_toml import document_as_toml
 from warpflat.app.scene.load import Scene, load_scene
 from warpflat.app.scene.run import run_scene
-from warpflat.core import InputError, atomic_path, check_file_name, document_as_toml, make_file_name, plain_name
+from warpflat.core import InputError, atomic_path, check_file_name, make_file_name, plain_name
 from warpflat.flat import Progress
 
 __all__ = ["Saved", "free_name", "run_saved", "scene_file", "write_scene"]
@@ -77,7 +78,7 @@ def write_scene(scene: Scene, name: str, *, replace: bool = False) -> Path:
     path = scene_file(scene, name)
     if path.exists() and not replace:
         raise InputError(f"{path}: there is such a file; choose to replace it, or give another name")
-    text = document_as_toml(scene.settings.model_dump(exclude_unset=True, by_alias=True))
+    text = document_as_toml(scene.settings.given())
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return path

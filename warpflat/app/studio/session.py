@@ -8,33 +8,24 @@ import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from warpflat.app.scene.cuts import scene_with
 from warpflat.app.scene.ledger import with_cut
 from warpflat.app.scene.load import Scene, scene_fabric
+from warpflat.app.scene.schema import DrapeTable
 from warpflat.app.studio.frame import PieceFrame, Watch
 from warpflat.app.studio.save import Saved, run_saved, scene_file, write_scene
 from warpflat.app.studio.solve import Solution, solve
-from warpflat.app.studio.worker import Job, Superseded, Ticket
+from warpflat.app.studio.worker import Superseded, Ticket, Worker
 from warpflat.core import InputError, activity_listener, one_line, system_reason
 from warpflat.flat import relaxation
-from warpflat.garment import Drape, DrapeOptions, drape
+from warpflat.garment import Drape, drape
 
-__all__ = ["Preview", "Runner", "Session", "Step"]
+__all__ = ["Preview", "Session", "Step"]
 
 # Tables that name pieces, edges and seams of a form: another form has others.
 _OF_ONE_FORM = ("cuts", "seams", "constraints", "openings", "finishing")
-
-
-class Runner(Protocol):
-    """What runs jobs; see :class:`warpflat.app.studio.worker.Worker`."""
-
-    def submit(self, job: Job, *, to_its_end: bool = False) -> None:
-        """Run a job; a newer one takes its place."""
-
-    def stop(self) -> None:
-        """Let the running job end with what it has."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -91,7 +82,7 @@ class Session:
     def __init__(
         self,
         scene: Scene,
-        runner: Runner,
+        worker: Worker,
         *,
         out: Path = Path("out"),
         on_change: Callable[[], None] = lambda: None,
@@ -100,12 +91,12 @@ class Session:
         """
         Args:
             scene: to begin with.
-            runner: runs what takes long.
+            worker: runs what takes long.
             out: where the folders of saved runs are made.
             on_change: called when anything but a frame is new.
             on_frame: called with a piece's name and how it lies, while it is being relaxed.
         """
-        self._runner, self._out = runner, out
+        self._worker, self._out = worker, out
         self._on_change, self._on_frame = on_change, on_frame
         self._lock = threading.RLock()
         self._steps, self._at = [Step(what="scene", scene=scene)], 0
@@ -192,7 +183,7 @@ class Session:
         if table is None:
             self.tell("the scene has no body; its [surface] is as large as its mesh")
             return
-        given = table.model_dump(exclude_unset=True, by_alias=True)
+        given = table.given()
         if size is not None:
             given = {key: value for key, value in given.items() if key not in ("measurements", "scan", "table")}
             self.change("size", mannequin={**given, "size": size})
@@ -260,7 +251,7 @@ class Session:
 
     def stop(self) -> None:
         """End what is being done; a pattern that is being relaxed is kept as far as it has come. Asked again, give up."""
-        self._runner.stop()
+        self._worker.stop()
 
     def watch(self, piece: str) -> None:
         """Relax a piece once more in the paper's plain steps, only to be looked at."""
@@ -306,12 +297,9 @@ class Session:
                 if not ticket.go_on():
                     raise Superseded
 
-            table = step.scene.settings.drape
-            options = None
-            if table is not None:
-                options = DrapeOptions(friction=table.friction, tolerance=table.tolerance, max_steps=table.max_steps)
+            table = step.scene.settings.drape or DrapeTable()
             garment = solution.garment or next(iter(solution.pieces.values()))
-            step.drape = drape(garment, hold=() if table is None else table.hold, options=options, callback=go_on)
+            step.drape = drape(garment, hold=table.hold, options=table.options(), callback=go_on)
             if not step.drape.converged:
                 self.note = (
                     'the drape is not at rest; cloth that slips off is held by the scene, as [drape] hold = ["waist"]'
@@ -432,7 +420,7 @@ class Session:
                 self.activity = ""
                 self._on_change()
 
-        self._runner.submit(whole, to_its_end=to_its_end)
+        self._worker.submit(whole, to_its_end=to_its_end)
 
     def _clear(self) -> None:
         self.error = self.note = ""

@@ -9,13 +9,13 @@ from functools import cached_property, partial
 import numpy as np
 
 from warpflat.app.scene.cuts import CutSequence
-from warpflat.app.scene.form import scene_form
+from warpflat.app.scene.form import scene_form, scene_mannequin
 from warpflat.app.scene.form_shaping import settle_shape, without_closed_darts
-from warpflat.app.scene.load import Scene, errors_named, expand_variables, scene_relax_options
+from warpflat.app.scene.load import Scene, errors_named, scene_relax_options
 from warpflat.app.scene.plan import GarmentPlan, plan_garment, plan_mesh, scene_cuts
 from warpflat.app.scene.surface import scene_surface
 from warpflat.flat import CutPlan, Flattening, Progress, Surface, Verdict, cut, garment_wear, judge, measure_cut
-from warpflat.garment import FormGarment, Mannequin, mannequin_from_table, measure_darts
+from warpflat.garment import FormGarment, measure_darts
 
 __all__ = ["Solution", "solve"]
 
@@ -109,7 +109,7 @@ def solve(
         return Solution(scene=scene, pieces={scene.name: result}, bare=bare, notes=(*sequence.notes, *result.messages))
     settled, notes = settle_shape(scene)
     plan = None if before is None else before.plan
-    mannequin = plan.mannequin if plan is not None and _alike(scene, plan.scene, _OF_BODY) else _body(scene)
+    mannequin = plan.mannequin if plan is not None and _alike(scene, plan.scene, _OF_BODY) else scene_mannequin(scene)
     if plan is not None and mannequin is plan.mannequin and _alike(settled, plan.scene, _OF_FORM):
         form = plan.form
     else:
@@ -147,13 +147,6 @@ def _known(plan: GarmentPlan, before: Solution | None) -> dict[str, Flattening]:
         return {}
     unsewn = {name: piece.unsewn for name, piece in before.pieces.items() if name in plan.form.pieces}
     return {name: piece for name, piece in unsewn.items() if piece is not None and piece.converged}
-
-
-def _body(scene: Scene) -> Mannequin:
-    table = scene.settings.mannequin
-    assert table is not None  # the scene has a form
-    with errors_named(f"{scene.where}: mannequin"):
-        return mannequin_from_table(table, path_of=lambda file: scene.folder / expand_variables(file))
 
 
 def _alike(one: Scene, other: Scene, keys: tuple[str, ...] | list[str]) -> bool:

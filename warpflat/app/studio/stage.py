@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+import warp as wp
 from scipy.spatial.transform import Rotation
 from trimesh import Trimesh
 
@@ -17,6 +18,7 @@ from warpflat.app.studio.maps import MapScale, face_values, vertex_values
 from warpflat.app.studio.pick import Hit, pick_flat, pick_on_rays
 from warpflat.core import FloatArray, IntArray
 from warpflat.flat import Surface, triangulate, vertex_normals
+from warpflat.garment import Body
 from warpflat.pattern import outline_edges, rows_on_table
 
 __all__ = ["Shown", "Stage"]
@@ -164,8 +166,8 @@ class Stage:
         if body is None:
             return
         low, high = self._boxes[0] + [-_BEYOND, _BEYOND]
-        # A little smaller than it is, so that cloth that lies on it is seen.
-        near = Trimesh(_above(body.vertices, body.faces, -0.004), triangulate(body.faces)[0], process=False)
+        shown = Body(body.vertices, body.faces, device=wp.get_device("cpu"))
+        near = Trimesh(shown.shrunk, shown.triangles, process=False)
         for origin, normals in ((low, np.eye(3)), (high, -np.eye(3))):
             near = near.slice_plane(np.tile(origin, (3, 1)), normals)
         self._nodes["/form/body"] = self._scene.add_mesh_simple(

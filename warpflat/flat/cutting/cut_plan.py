@@ -18,7 +18,8 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import arc_lengths
 from warpflat.core.short_repr import short_repr
 from warpflat.flat.flattening.applied_cut import AppliedCut
-from warpflat.flat.surface.cut.cut_mesh import Crack, Cut, cut_along_many
+from warpflat.flat.surface.cut.crack import Crack
+from warpflat.flat.surface.cut.cut_mesh import Cut, cut_along
 from warpflat.flat.surface.cut.pieces import apply_cut
 from warpflat.flat.surface.cut.split_faces import split_faces_along
 from warpflat.flat.surface.mesh import Surface
@@ -110,7 +111,7 @@ def make_cuts(surface: Surface, plans: Sequence[CutPlan]) -> CutSurface:
     """
     if not plans:
         return CutSurface(surface=surface, cuts=(), cut=None)
-    topology = cut_along_many(
+    topology = cut_along(
         surface.faces, [path for plan in plans for path in plan.paths], vertex_count=len(surface.vertices)
     )
     owner = {edge: number for number, plan in enumerate(plans) for path in plan.paths for edge in _edges(path)}

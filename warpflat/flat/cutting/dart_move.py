@@ -18,9 +18,9 @@ from warpflat.flat.flattening.progress import Progress
 from warpflat.flat.flattening.result import Flattening
 from warpflat.flat.solver.options import RelaxOptions, given_options
 from warpflat.flat.surface.cells import LEAST_AREA
-from warpflat.flat.surface.cut.cut_mesh import Crack
+from warpflat.flat.surface.cut.crack import Crack
 from warpflat.flat.surface.cut.dart import dart_measure
-from warpflat.flat.surface.half_edges import mesh_edges
+from warpflat.flat.surface.falloff import harmonic_values
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.untangle import untangle
 
@@ -106,9 +106,6 @@ def move_dart(
 
 def _close_cracks(surface: Surface, positions: FloatArray, seams: Sequence[Crack]) -> FloatArray:
     """Move both sides of cracks to the middle between them, and everything else along harmonically; return the layout."""
-    from scipy.sparse import coo_matrix, diags
-    from scipy.sparse.linalg import spsolve
-
     shift = np.zeros_like(positions)
     fixed = np.zeros(len(positions), dtype=bool)
     for seam in seams:
@@ -116,18 +113,8 @@ def _close_cracks(surface: Surface, positions: FloatArray, seams: Sequence[Crack
         for side in (seam.left, seam.right):
             shift[side] = middle - positions[side]
             fixed[side] = True
-    edges = mesh_edges(surface.faces)
-    ones = np.ones(2 * len(edges))
-    rows, columns = np.concatenate([edges[:, 0], edges[:, 1]]), np.concatenate([edges[:, 1], edges[:, 0]])
-    joined = coo_matrix((ones, (rows, columns)), shape=(len(positions), len(positions))).tocsr()
-    degree = np.asarray(joined.sum(axis=1)).ravel()
-    # Pieces that no crack touches stay; the tiny share of a vertex itself keeps their equations solvable.
-    laplacian = diags(degree + 1e-9) - joined
-    free = np.flatnonzero(~fixed)
-    if len(free):
-        pull = joined[free][:, np.flatnonzero(fixed)] @ shift[fixed]
-        shift[free] = spsolve(laplacian.tocsr()[free][:, free].tocsc(), pull).reshape(-1, 2)
-    return positions + shift
+    # Pieces that no crack touches stay.
+    return positions + harmonic_values(surface.faces, shift, fixed)
 
 
 def _angle_of(result: Flattening, name: str) -> float:

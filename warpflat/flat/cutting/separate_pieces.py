@@ -14,7 +14,7 @@ from warpflat.flat.flattening.result import Flattening
 from warpflat.flat.model.strain import strain_energy
 from warpflat.flat.solver.options import RelaxOptions
 from warpflat.flat.solver.steps import Relaxation
-from warpflat.flat.surface.cut.cut_mesh import Crack
+from warpflat.flat.surface.cut.crack import Crack
 from warpflat.flat.surface.cut.pieces import CutPart, split_pieces
 from warpflat.flat.surface.mesh import Surface
 

@@ -16,7 +16,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.toml_file import Table, check_table, read_toml
-from warpflat.flat.fabric.fabric import SHEAR_BY_STRAIN, Fabric, Provenance, fabric_called
+from warpflat.flat.fabric.fabric import SHEAR_BY_STRAIN, Curve, Fabric, Provenance, fabric_called
 from warpflat.flat.fabric.instruments import (
     FAST_LOADS,
     GF_PER_CM,
@@ -51,6 +51,8 @@ _PER_POINT = 1.2
 _FLATTEST = 1e-3
 
 Grade = Literal["A", "B", "C", "D", "E"]
+#: Values of a fabric by attribute, each with its origin.
+Given = dict[str, tuple[Any, Provenance]]
 _Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
@@ -88,6 +90,19 @@ class CurveTable(_Origin):
             )
         return self
 
+    def tensions(self, factor: float) -> Curve:
+        """Return its points with tensions in N/m, by the factor of its unit; secants change evenly from strain to strain."""
+        found = [(strain, tension * factor) for strain, tension in self.points or ()]
+        for (e0, k0), (e1, k1) in itertools.pairwise(self.secants or []):
+            slope = (k1 - k0) / (e1 - e0)
+            first, last = np.maximum([k0 + slope * e0, k1 + slope * e1], _FLATTEST * max(k0, k1))
+            count = max(math.ceil(abs(math.log(last / first)) / math.log(_PER_POINT)), 1)
+            tangents = np.geomspace(first, last, count + 1)[1:]
+            shares = (tangents - first) / (last - first) if count > 1 else np.ones(1)
+            strains = (e0 + shares * (e1 - e0)).tolist()
+            found += [(e, (k0 + slope * (e - e0)) * factor * e) for e in strains]
+        return tuple(found)
+
 
 class KesTable(Table):
     """Readings of KES-F: EMT [%], LT, the maximum load [gf/cm], shear G [gf/(cm deg)], bending B [gf cm2/cm], weight W [mg/cm2]."""
@@ -102,6 +117,26 @@ class KesTable(Table):
     w: float | None = Field(default=None, gt=0)
     source: str = "KES-F readings"
     grade: Grade | None = None
+
+    def values(self) -> Given:
+        """Return the values of a fabric that follow from the readings, each with its origin."""
+        given, load = Given(), self.max_load * GF_PER_CM
+        origin = Provenance(source=self.source, grade=self.grade or "")
+        for direction in ("warp", "weft"):
+            emt, linearity = getattr(self, f"emt_{direction}"), getattr(self, f"lt_{direction}")
+            at_load = replace(origin, unit="percent at load", test_load=f"{load:.0f} N/m")
+            given[f"stiffness_{direction}"] = stiffness_from_extension(emt, load), at_load
+            if linearity is not None:
+                source = f"{self.source}; power law that meets EMT and LT"
+                of_curve = replace(origin, source=source, unit="N/m", test_load=f"up to {load:.0f} N/m")
+                given[f"curve_{direction}"] = curve_from_kes(emt, linearity, load), of_curve
+        if self.g is not None:
+            given["shear_stiffness"] = shear_stiffness_from_kes(self.g), replace(origin, unit="gf/(cm deg)")
+        if self.b is not None:
+            given["bending"] = self.b * KES_BENDING_UNIT, replace(origin, unit="gf cm2/cm")
+        if self.w is not None:
+            given["areal_density"] = self.w * 0.01, replace(origin, unit="mg/cm2")
+        return given
 
 
 class FastTable(Table):
@@ -118,6 +153,26 @@ class FastTable(Table):
     w: float | None = Field(default=None, gt=0)
     source: str = "FAST readings"
     grade: Grade | None = None
+
+    def values(self) -> Given:
+        """Return the values of a fabric that follow from the readings, each with its origin."""
+        given, origin = Given(), Provenance(source=self.source, grade=self.grade or "")
+        for direction in ("warp", "weft"):
+            e5, e20, e100 = (getattr(self, f"{key}_{direction}") for key in ("e5", "e20", "e100"))
+            at_load = replace(origin, unit="percent at load", test_load="98.1 N/m")
+            given[f"stiffness_{direction}"] = stiffness_from_extension(e100, FAST_LOADS["e100"]), at_load
+            if e5 is not None and e20 is not None:
+                of_curve = replace(origin, unit="N/m", test_load="4.9, 19.6 and 98.1 N/m")
+                given[f"curve_{direction}"] = curve_from_fast(e5, e20, e100), of_curve
+        if self.eb5 is not None:
+            of_eb5 = replace(origin, unit="percent", test_load="EB5")
+            given["shear_stiffness"] = shear_stiffness_from_fast(self.eb5), of_eb5
+        if self.c is not None and self.w is not None:
+            of_c = replace(origin, unit="mm", test_load="bending length")
+            given["bending"] = bending_from_fast(self.c, self.w), of_c
+        if self.w is not None:
+            given["areal_density"] = self.w * 1e-3, replace(origin, unit="g/m2")
+        return given
 
     @model_validator(mode="after")
     def _weight_of_bending(self) -> FastTable:
@@ -233,42 +288,9 @@ def fabric_from_table(
             values = {f.name: getattr(base, f.name) for f in fields(Fabric) if f.name not in ("name", "aliases")}
             origins = dict(values.pop("provenance"))
         # Readings replace what comes from the base, and values that the table gives itself replace readings.
-        given: dict[str, tuple[Any, Provenance]] = {}
-        if table.kes is not None:
-            kes, load = table.kes, table.kes.max_load * GF_PER_CM
-            origin = Provenance(source=kes.source, grade=kes.grade or "")
-            for direction in ("warp", "weft"):
-                emt, linearity = getattr(kes, f"emt_{direction}"), getattr(kes, f"lt_{direction}")
-                at_load = replace(origin, unit="percent at load", test_load=f"{load:.0f} N/m")
-                given[f"stiffness_{direction}"] = stiffness_from_extension(emt, load), at_load
-                if linearity is not None:
-                    source = f"{kes.source}; power law that meets EMT and LT"
-                    of_curve = replace(origin, source=source, unit="N/m", test_load=f"up to {load:.0f} N/m")
-                    given[f"curve_{direction}"] = curve_from_kes(emt, linearity, load), of_curve
-            if kes.g is not None:
-                given["shear_stiffness"] = shear_stiffness_from_kes(kes.g), replace(origin, unit="gf/(cm deg)")
-            if kes.b is not None:
-                given["bending"] = kes.b * KES_BENDING_UNIT, replace(origin, unit="gf cm2/cm")
-            if kes.w is not None:
-                given["areal_density"] = kes.w * 0.01, replace(origin, unit="mg/cm2")
-        if table.fast is not None:
-            fast = table.fast
-            origin = Provenance(source=fast.source, grade=fast.grade or "")
-            for direction in ("warp", "weft"):
-                e5, e20, e100 = (getattr(fast, f"{key}_{direction}") for key in ("e5", "e20", "e100"))
-                at_load = replace(origin, unit="percent at load", test_load="98.1 N/m")
-                given[f"stiffness_{direction}"] = stiffness_from_extension(e100, FAST_LOADS["e100"]), at_load
-                if e5 is not None and e20 is not None:
-                    of_curve = replace(origin, unit="N/m", test_load="4.9, 19.6 and 98.1 N/m")
-                    given[f"curve_{direction}"] = curve_from_fast(e5, e20, e100), of_curve
-            if fast.eb5 is not None:
-                of_eb5 = replace(origin, unit="percent", test_load="EB5")
-                given["shear_stiffness"] = shear_stiffness_from_fast(fast.eb5), of_eb5
-            if fast.c is not None and fast.w is not None:
-                of_c = replace(origin, unit="mm", test_load="bending length")
-                given["bending"] = bending_from_fast(fast.c, fast.w), of_c
-            if fast.w is not None:
-                given["areal_density"] = fast.w * 1e-3, replace(origin, unit="g/m2")
+        given = Given()
+        for instrument in (table.kes, table.fast):
+            given |= {} if instrument is None else instrument.values()
         for key, units in _UNITS.items():
             value: float | ValueTable | None = getattr(table, key)
             if isinstance(value, ValueTable):
@@ -282,18 +304,7 @@ def fabric_from_table(
             curve: CurveTable | None = getattr(table, key)
             if curve is not None:
                 factor = _factor(name, key, curve.unit, _TENSILE)
-                points = [(strain, tension * factor) for strain, tension in curve.points or ()]
-                if curve.points is None:
-                    # Of secants, which change evenly from strain to strain.
-                    for (e0, k0), (e1, k1) in itertools.pairwise(curve.secants or []):
-                        slope = (k1 - k0) / (e1 - e0)
-                        first, last = np.maximum([k0 + slope * e0, k1 + slope * e1], _FLATTEST * max(k0, k1))
-                        count = max(math.ceil(abs(math.log(last / first)) / math.log(_PER_POINT)), 1)
-                        tangents = np.geomspace(first, last, count + 1)[1:]
-                        shares = (tangents - first) / (last - first) if count > 1 else np.ones(1)
-                        strains = (e0 + shares * (e1 - e0)).tolist()
-                        points += [(e, (k0 + slope * (e - e0)) * factor * e) for e in strains]
-                given[key] = tuple(points), _provenance(curve, curve.unit, sources or {})
+                given[key] = curve.tensions(factor), _provenance(curve, curve.unit, sources or {})
         # A curve of the base would contradict a stiffness that is given here.
         for direction in ("warp", "weft"):
             if f"stiffness_{direction}" in given:

@@ -13,7 +13,7 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.flat.surface.connectivity import border_loops
-from warpflat.flat.surface.cut.cut_mesh import Crack
+from warpflat.flat.surface.cut.crack import Crack
 from warpflat.flat.surface.cut.dart import dart_measure, fish_eye_measure, mouth_first, shape_dart, shape_fish_eye
 from warpflat.flat.surface.cut.dart_legs import are_curved, pull_back
 from warpflat.flat.surface.mesh import Surface
@@ -102,10 +102,10 @@ def _drawn(positions: FloatArray, seam: Crack, kind: str, tip_back: float, loops
                 "intake_m": eye.intake,
                 "points_m": [p.tolist() for p in (eye.first_tip, eye.left_point, eye.last_tip, eye.right_point)],
             }
-        x, left, right = mouth_first(positions, seam.left, seam.right)
+        left, right = mouth_first(seam.left, seam.right)
         outline = next(loop for loop in loops if left[0] in loop)
         dart = shape_dart(positions, seam.left, seam.right, outline, tip_back=tip_back)
-        legs = pull_back(x[left], x[right], tip_back)
+        legs = pull_back(positions[left], positions[right], tip_back)
     except InputError as reason:
         return {"not_drawn": str(reason)}
     if are_curved(*legs):

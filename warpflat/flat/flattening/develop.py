@@ -29,6 +29,7 @@ from warpflat.flat.surface.grid import rows_and_columns
 from warpflat.flat.surface.half_edges import half_edges, half_edges_of, opposite_half_edges
 from warpflat.flat.surface.injective import winds_twice
 from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.normals import area_vectors
 from warpflat.flat.surface.paths.geodesic import signed_distance_and_station
 from warpflat.flat.surface.triangles import corner_triangles, triangulate
 from warpflat.flat.surface.untangle import signed_cell_areas, untangle
@@ -227,8 +228,7 @@ def flat_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
     if strays > np.sqrt(_FEW_VERTICES) * 4 * _FLAT * np.linalg.norm(np.ptp(some, axis=0)):
         return None
     triangles, _ = triangulate(surface.faces)
-    p = surface.vertices[triangles]
-    facing = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]).sum(axis=0)
+    facing = area_vectors(surface.vertices, triangles).sum(axis=0)
     away = surface.vertices - surface.vertices.mean(axis=0)
     if (
         np.ptp(away @ facing) > _FLAT * np.linalg.norm(np.ptp(away, axis=0)) * np.linalg.norm(facing)

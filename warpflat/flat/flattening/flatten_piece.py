@@ -35,6 +35,7 @@ from warpflat.flat.surface.grid import rows_and_columns
 from warpflat.flat.surface.half_edges import half_edges_of
 from warpflat.flat.surface.laplacian import factor_pays
 from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.normals import flat_areas
 from warpflat.flat.surface.triangles import triangulate
 from warpflat.flat.surface.untangle import untangle
 
@@ -280,8 +281,7 @@ def nearly_closed_notes(surface: Surface) -> list[str]:
     he = half_edges_of(surface)
     length = np.linalg.norm(surface.vertices[he.edges[:, 1]] - surface.vertices[he.edges[:, 0]], axis=1)
     border = float(length[he.count == 1].sum())
-    a, b, c = surface.vertices[triangulate(surface.faces)[0]].transpose(1, 0, 2)
-    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    area = float(flat_areas(surface.vertices, triangulate(surface.faces)[0]).sum())
     if border == 0.0 or border**2 >= _LEAST_SHARE * 4.0 * np.pi * area:
         return []
     count = len(surface.vertices)

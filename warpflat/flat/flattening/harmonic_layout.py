@@ -9,6 +9,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.flat.surface.connectivity import border_loops
 from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.normals import flat_areas
 from warpflat.flat.surface.triangles import triangulate
 from warpflat.flat.surface.tubes import tube_borders
 
@@ -60,8 +61,7 @@ def harmonic_layout(surface: Surface, *, border: FloatArray | None = None) -> Fl
     if border is None:
         arc = arc_lengths(surface.vertices[outer], closed=True)
         angle = 2 * np.pi * arc[:-1] / arc[-1]
-        q = surface.vertices[triangles]
-        area = 0.5 * np.linalg.norm(np.cross(q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]), axis=1).sum()
+        area = flat_areas(surface.vertices, triangles).sum()
         border = np.sqrt(area / np.pi) * np.column_stack([np.cos(angle), np.sin(angle)])
     layout = np.zeros((size, 2))
     layout[outer] = border

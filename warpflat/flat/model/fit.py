@@ -210,13 +210,12 @@ def assess_pattern(surface: Surface, fabric: Fabric, pattern: ArrayLike, *, grai
     return assess_fit(SpringNetwork.build(surface, fabric, flat, grain_angle=grain_angle, device="cpu"), flat)
 
 
-def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_length: float = SKIN_LENGTH) -> WornFit:
+def assess_fit(network: SpringNetwork, positions: FloatArray) -> WornFit:
     """Return the fit of a layout (#V by 2 [m]) of the network's surface in the network's fabric, with any model.
 
     Args:
         network: of the piece.
         positions: #V by 2, its pattern [m].
-        smoothing_length: over which the pressure is averaged [m].
     """
     fabric, surface = network.fabric, network.surface
     # By the fabric's own law with its curves, with any model.
@@ -241,7 +240,7 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
     tension_warp, tension_weft, loaded = mean(pull[:, 0]), mean(pull[:, 1]), mean(load)
     # A million faces of them take a tenth of a gigabyte each, and the smoothing more.
     del strain, stress, lengths, spread, pull, load, along_warp, along_weft, crossed
-    pressure = smooth_face_values(surface, loaded, smoothing_length)
+    pressure = smooth_face_values(surface, loaded, SKIN_LENGTH)
     # A stretch that is asked for beyond the limit is meant: the cloth is judged from there.
     asked = np.zeros((faces, 2)) if network.stretch is None else network.stretch - 1.0
     meant = np.where(asked > fabric.strain_limit, asked, 0.0)

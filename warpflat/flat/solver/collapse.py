@@ -105,15 +105,8 @@ def _every_second(surface: Surface, grid: IntArray) -> Coarsening:
     row, column = (of[surface.faces].min(axis=1) for of in np.divmod(place, grid.shape[1]))
     face_at = np.empty((grid.shape[0] - 1, grid.shape[1] - 1), dtype=np.int32)
     face_at[row, column] = np.arange(len(surface.faces), dtype=np.int32)
-    vertices = surface.vertices[kept.ravel()]
     return Coarsening(
-        surface=Surface(
-            vertices=vertices,
-            faces=faces,
-            name=surface.name,
-            input_vertices=vertices,
-            input_index=number.ravel(),
-        ),
+        surface=Surface(vertices=surface.vertices[kept.ravel()], faces=faces, name=surface.name),
         kept=kept.ravel(),
         into=number[np.ix_(*nearest)].ravel()[place],
         prolongation=csr_array(kron(*between, format="csr"))[place],
@@ -166,13 +159,10 @@ def coarsen(surface: Surface) -> Coarsening | None:
     corners = into[triangles]
     whole = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 2] != corners[:, 0])
     corners = corners[whole]
-    vertices = surface.vertices[kept]
     coarse = Surface(
-        vertices=vertices,
+        vertices=surface.vertices[kept],
         faces=np.column_stack([corners, np.full(len(corners), -1)]).astype(np.int32),
         name=surface.name,
-        input_vertices=vertices,
-        input_index=np.arange(len(kept), dtype=np.int32),
     )
     prolongation = _prolongation(gone, parent, weight, int(passes[0]))
     return Coarsening(surface=coarse, kept=kept, into=into, prolongation=prolongation, face_of=face[whole])

@@ -25,6 +25,7 @@ from warpflat.flat.solver.minimise import Cloth, Descent
 from warpflat.flat.solver.options import RelaxOptions
 from warpflat.flat.solver.steps import Relaxation, relax_by_steps, take_first_steps
 from warpflat.flat.solver.stop import Outcome
+from warpflat.flat.surface.laplacian import MOST_FACTORED
 
 __all__ = ["ConstrainedOutcome", "factor_pays", "relax_under_equations"]
 
@@ -37,8 +38,6 @@ _MOST_ROUNDS = 50
 _PATIENCE = 10
 # After so many steps the factor is made again at the end of a round.
 _STEPS_PER_FACTOR = 25
-# The most vertices of a network that is factored: a factor's entries grow faster than the mesh.
-_MOST_VERTICES = 100_000
 # Of the paper's steps alone: steps of a round at most, since the residuals of a whole seam take a dozen rounds, whether the cloth has come
 # to rest before the offsets grow or only begun to. After every few rounds the next ones become a quarter longer: offsets that follow cloth
 # that still swings keep it swinging.
@@ -67,7 +66,7 @@ class ConstrainedOutcome:
 
 def factor_pays(network: SpringNetwork, options: RelaxOptions) -> bool:
     """Return whether the stiffness of a network is factored: if it is not too large, and the paper's steps alone are not asked for."""
-    return options.solver != "paper" and network.vertex_count <= _MOST_VERTICES
+    return options.solver != "paper" and network.vertex_count <= MOST_FACTORED
 
 
 def _stiffness_metric(state: Relaxation) -> Metric:

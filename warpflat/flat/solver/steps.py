@@ -180,29 +180,33 @@ class Relaxation:
 
     def _evaluation(self, scope: int) -> LaunchSequence:
         net, x, v = self.network, self.position, self.velocity
-        cells = [
+        how = [self.time_step, self._coefficients, scope]
+        own = [x, v, net.mass, net.spring_stiffness, net.springs, net.cells, self._cell_forces]
+        given = [*own, net.bonds, self._seam_forces, self.load, *how]
+        gather = self._on_vertices(gather_forces, given, [self._forces], turns=_TURNS)
+        cells = self._on_cells("step", [x, v], how, [self._cell_forces], turns=_TURNS)
+        return LaunchSequence([*cells, *self._evaluate_seams, gather])
+
+    def _on_vertices(self, kernel: wp.Kernel, given: list[Any], made: list[Any], turns: int = 1) -> Launch:
+        """Record the launch of a kernel over all vertices."""
+        net = self.network
+        return record(kernel, dim=net.vertex_count, inputs=given, outputs=made, device=net.device, turns=turns)
+
+    def _on_cells(self, kernel: str, where: list[Any], how: list[Any], made: list[Any], turns: int = 1) -> list[Launch]:
+        """Record the launches over the cells of each model of its kernel of that name."""
+        net = self.network
+        return [
             record(
-                each.step,
+                getattr(each, kernel),
                 dim=each.count,
                 first=each.first,
-                inputs=[x, v, net.cells, each.parameters, self.time_step, self._coefficients, scope],
-                outputs=[self._cell_forces],
+                inputs=[*where, net.cells, each.parameters, *how],
+                outputs=made,
                 device=net.device,
-                turns=_TURNS,
+                turns=turns,
             )
             for each in net.cell_models
         ]
-        own = [x, v, net.mass, net.spring_stiffness, net.springs, net.cells, self._cell_forces]
-        of_seams = [net.bonds, self._seam_forces, self.load, self.time_step, self._coefficients, scope]
-        gather = record(
-            gather_forces,
-            dim=net.vertex_count,
-            inputs=[*own, *of_seams],
-            outputs=[self._forces],
-            device=net.device,
-            turns=_TURNS,
-        )
-        return LaunchSequence([*cells, *self._evaluate_seams, gather])
 
     @cached_property
     def _evaluate_seams(self) -> list[Launch]:
@@ -215,17 +219,15 @@ class Relaxation:
 
     @cached_property
     def _stop(self) -> Launch:
-        net, at = self.network, self._forces
-        given = [net.mass, self.force, at.stiffness, self.time_step]
-        made = [self.velocity, at.driving_force, at.first_guess]
-        return record(stop, dim=net.vertex_count, inputs=given, outputs=made, device=net.device)
+        at = self._forces
+        given = [self.network.mass, self.force, at.stiffness, self.time_step]
+        return self._on_vertices(stop, given, [self.velocity, at.driving_force, at.first_guess])
 
     @cached_property
     def _advance(self) -> Launch:
         net = self.network
         given = [net.mass, net.springs, net.bonds, self._forces, self.time_step, self._coefficients]
-        made = [self.position, self.velocity]
-        return record(advance, dim=net.vertex_count, inputs=given, outputs=made, device=net.device)
+        return self._on_vertices(advance, given, [self.position, self.velocity])
 
     def _set_coefficients(self, coefficients: tuple[float, float, float]) -> None:
         values = self._on_host(self._coefficients)
@@ -300,58 +302,23 @@ class Relaxation:
         The mean has a floor of 1e-9 K L, the force of a spring strained by 1e-9, so that a layout without strain counts as at rest.
         """
         net, springs = self.network, self.network.spring_arrays
-        given, made = [self.position, net.springs], [self._vertex_energy]
-        record(compute_spring_tension, dim=net.vertex_count, inputs=given, outputs=made, device=net.device).launch()
+        self._on_vertices(compute_spring_tension, [self.position, net.springs], [self._vertex_energy]).launch()
         mean = self._total(self._vertex_energy) / net.spring_count
         floor = 1e-9 * dot(springs.listed_stiffness, springs.listed_length) / len(springs.listed_length)
         return self.largest_force() / max(mean, floor)
 
     @cached_property
     def _measure_potential(self) -> LaunchSequence:
-        net = self.network
-        springs = record(
-            compute_spring_energy,
-            dim=net.vertex_count,
-            inputs=[self.position, net.springs],
-            outputs=[self._vertex_energy],
-            device=net.device,
-        )
-        cells = [
-            record(
-                each.energy,
-                dim=each.count,
-                first=each.first,
-                inputs=[self.position, net.cells, each.parameters],
-                outputs=[self._face_energy],
-                device=net.device,
-            )
-            for each in net.cell_models
-        ]
-        return LaunchSequence([springs, *cells])
+        given, made = [self.position, self.network.springs], [self._vertex_energy]
+        cells = self._on_cells("energy", [self.position], [], [self._face_energy])
+        return LaunchSequence([self._on_vertices(compute_spring_energy, given, made), *cells])
 
     @cached_property
     def _evaluate_potential(self) -> LaunchSequence:
-        net = self.network
-        cells = [
-            record(
-                each.potential,
-                dim=each.count,
-                first=each.first,
-                inputs=[self.position, net.cells, each.parameters],
-                outputs=[self._face_energy, self._cell_forces],
-                device=net.device,
-                turns=_TURNS,
-            )
-            for each in net.cell_models
-        ]
-        gather = record(
-            gather_potential,
-            dim=net.vertex_count,
-            inputs=[self.position, net.springs, net.cells, self._cell_forces, net.bonds, self._seam_forces],
-            outputs=[self._vertex_energy, self._rest_force],
-            device=net.device,
-            turns=_TURNS,
-        )
+        net, of_faces = self.network, [self._face_energy, self._cell_forces]
+        given = [self.position, net.springs, net.cells, self._cell_forces, net.bonds, self._seam_forces]
+        gather = self._on_vertices(gather_potential, given, [self._vertex_energy, self._rest_force], turns=_TURNS)
+        cells = self._on_cells("potential", [self.position], [], of_faces, turns=_TURNS)
         return LaunchSequence([*cells, *self._evaluate_seams, gather])
 
     # --- convergence

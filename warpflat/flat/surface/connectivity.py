@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.flat.surface.half_edges import (
@@ -33,9 +33,11 @@ __all__ = [
     "components_of",
     "corner_fans",
     "euler_characteristic",
+    "fan_labels",
     "join_labels",
     "non_manifold_vertices",
     "orient",
+    "part_fans",
 ]
 
 
@@ -88,21 +90,52 @@ def _components(he: HalfEdges, size: int, barrier: IntArray | None) -> IntArray:
     return join_labels(size, a, b)
 
 
-def corner_fans(faces: ArrayLike | HalfEdges) -> IntArray:
-    """Return #H, the fan of faces around its vertex to which each corner (tail of a half-edge) belongs.
+def fan_labels(he: HalfEdges, a: NDArray[np.integer], b: NDArray[np.integer]) -> IntArray:
+    """Return #H, the fan of faces around its vertex to which each corner (tail of a half-edge) belongs, numbered by their first corners.
 
-    Corners at one vertex belong to one fan where their faces share an edge at that vertex. A vertex of a manifold has one
-    fan; a vertex with more is where parts of the surface touch in a point only.
+    Corners at one vertex belong to one fan where their faces are joined at an edge of that vertex: by the pairs a-b (#P each) of half-edges
+    that share it.
     """
-    return _corner_fans(half_edges(faces))
-
-
-def _corner_fans(he: HalfEdges) -> IntArray:
-    a, b = paired_half_edges(he)
     opposite = he.tail[a] == he.head[b]
     at_tail = np.where(opposite, he.next[b], b)
     at_head = np.where(opposite, b, he.next[b])
     return join_labels(len(he.tail), np.concatenate([a, he.next[a]]), np.concatenate([at_tail, at_head]))
+
+
+def corner_fans(he: HalfEdges) -> IntArray:
+    """Return `fan_labels` of faces that are joined at all their edges.
+
+    A vertex of a manifold has one fan; a vertex with more is where parts of the surface touch in a point only.
+    """
+    return fan_labels(he, *paired_half_edges(he))
+
+
+def part_fans(
+    he: HalfEdges, fan: IntArray, torn: BoolArray, *, keeping: NDArray[np.integer] | None = None
+) -> tuple[IntArray, IntArray]:
+    """Give each fan of faces a vertex of its own.
+
+    Args:
+        he: half-edges of the faces.
+        fan: #H, of :func:`fan_labels`.
+        torn: #V, true at the vertices whose fans are parted.
+        keeping: corners whose fans keep their vertex, the first one at each vertex; elsewhere it is the fan with the first corner of all.
+
+    Returns:
+        #F by 4, the faces; #W, for each vertex the one that it was: the first #V are 0, 1, 2, ..., the copies follow.
+    """
+    first = np.flatnonzero(np.diff(np.maximum.accumulate(fan), prepend=-1))
+    vertex, count = he.tail[first], len(torn)
+    keeper = np.empty(count, dtype=np.int64)
+    # Of several values that are given to one vertex the last is kept.
+    for corners in (first,) if keeping is None else (first, keeping):
+        keeper[he.tail[corners[::-1]]] = fan[corners[::-1]]
+    copies = np.flatnonzero((keeper[vertex] != np.arange(len(first))) & torn[vertex])
+    number = vertex.astype(np.int32)
+    number[copies] = count + np.arange(len(copies))
+    faces = he.faces.copy()
+    faces[he.face, he.slot] = number[fan]
+    return faces, np.concatenate([np.arange(count, dtype=np.int32), vertex[copies]])
 
 
 def non_manifold_vertices(faces: ArrayLike) -> IntArray:
@@ -110,7 +143,7 @@ def non_manifold_vertices(faces: ArrayLike) -> IntArray:
     he = half_edges(faces)
     if len(he.tail) == 0:
         return np.empty(0, dtype=np.int32)
-    _, first = np.unique(_corner_fans(he), return_index=True)
+    _, first = np.unique(corner_fans(he), return_index=True)
     vertex, count = np.unique(he.tail[first], return_counts=True)
     return vertex[count > 1].astype(np.int32)
 
@@ -135,7 +168,7 @@ def border_loops(faces: ArrayLike | HalfEdges, vertices: FloatArray | None = Non
     start, end = alone, he.next[alone]
     node = he.tail
     if len(np.unique(he.tail[start])) < len(start):
-        node = _corner_fans(he)
+        node = corner_fans(he)
     follow = dict(zip(node[start].tolist(), node[end].tolist(), strict=True))
     if len(follow) < len(start) or set(follow) != set(follow.values()):
         raise InputError("the border does not close into loops: the faces are wound inconsistently; orient them first")

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.launch import launch_each
 from warpflat.core.polyline import nearest_on_polyline, segment_lengths
@@ -20,21 +19,7 @@ from warpflat.flat.surface.mesh import Surface, once_per_surface
 from warpflat.flat.surface.triangles import corner_triangles
 from warpflat.kernels.unfold import measure_triangles
 
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
-
-__all__ = [
-    "EnergyMap",
-    "EnergyPeak",
-    "LineEnergy",
-    "energy_map",
-    "energy_peak",
-    "energy_report",
-    "integrate_along",
-    "integrate_faces",
-    "place_in_words",
-    "smooth_to_vertices",
-]
+__all__ = ["energy_report", "place_in_words", "smooth_to_vertices"]
 
 
 # Relative tolerance of the diffusion, and the number of iterations after which it is solved directly, as slivers may need.
@@ -44,128 +29,65 @@ _MOST_ITERATIONS = 1000
 _LARGE = 50_000
 
 
-@dataclass(frozen=True, kw_only=True)
-class LineEnergy:
-    """The energy density along a line.
-
-    Attributes:
-        length: of the line [m].
-        integral: of the density along the line [J/m]: what a strip around it holds per metre of its width.
-        mean: integral / length [J/m2]; of a line without length, the mean of its vertices.
-        peak: the highest density on the line [J/m2].
-        peak_vertex: the vertex with that density.
-    """
-
-    length: float
-    integral: float
-    mean: float
-    peak: float
-    peak_vertex: int
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class EnergyPeak:
-    """The place of the highest energy density.
-
-    Attributes:
-        vertex: the surface vertex.
-        position: where it is [m].
-        density: there [J/m2].
-        lines: distance [m] from the peak to each feature line, nearest first.
-        landmarks: distance [m] to each landmark, nearest first.
-        words: the place as a sentence for a pattern maker.
-    """
-
-    vertex: int
-    position: FloatArray
-    density: float
-    lines: Mapping[str, float]
-    landmarks: Mapping[str, float]
-    words: str
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class EnergyMap:
-    """The energy distribution over a surface.
-
-    Attributes:
-        face_density: #F [J/m2].
-        vertex_density: #V [J/m2], smoothed.
-        total: the energy of the whole surface [J].
-        regions: the energy of each named face set [J].
-        lines: the energy along each feature line.
-        peak: the place of the highest smoothed density.
-    """
-
-    face_density: FloatArray
-    vertex_density: FloatArray
-    total: float
-    regions: Mapping[str, float]
-    lines: Mapping[str, LineEnergy]
-    peak: EnergyPeak
-
-
-def energy_map(
-    surface: Surface,
-    face_density: ArrayLike,
-    *,
-    regions: Mapping[str, ArrayLike] | None = None,
-    landmarks: Mapping[str, ArrayLike | int] | None = None,
-    smoothing_length: float = 0.0,
-    up: ArrayLike = (0.0, 1.0, 0.0),
-) -> EnergyMap:
-    """Map the energy of a piece: smoothed density, totals, and its peak.
-
-    Args:
-        surface: the surface the density belongs to.
-        face_density: #F, strain energy per area of the 3D face [J/m2].
-        regions: face sets by name (bricks, say): face indices, or #F booleans.
-        landmarks: named places: vertex indices or positions [m].
-        smoothing_length: see :func:`smooth_to_vertices` [m].
-        up: the direction in which something is "above".
-
-    Raises:
-        InputError: for arrays of the wrong shape, values that are not finite, faces or landmarks that do not exist.
-    """
-    density = _checked_density(face_density, len(surface.faces), "face")
-    at_vertices = smooth_to_vertices(surface, density, smoothing_length=smoothing_length)
-    return EnergyMap(
-        face_density=density,
-        vertex_density=at_vertices,
-        total=float(density @ _face_areas(surface)),
-        regions=integrate_faces(surface, density, regions or {}),
-        lines={name: integrate_along(surface, at_vertices, line) for name, line in surface.lines.items()},
-        peak=energy_peak(surface, at_vertices, landmarks=landmarks, up=up),
-    )
-
-
 def energy_report(
-    surface: Surface, face_energy: ArrayLike, *, regions: Mapping[str, ArrayLike] | None = None
+    surface: Surface, face_energy: ArrayLike, *, regions: Mapping[str, BoolArray] | None = None
 ) -> dict[str, Any]:
     """Describe the energy distribution of a piece, as in `metrics.json`.
 
     Args:
         surface: the surface the energies belong to.
         face_energy: #F, strain energy of each face [J].
-        regions: face sets by name, bricks say.
+        regions: face sets by name (bricks, say), #F each.
 
     Returns:
         "peak" in words, per line its length and its mean and highest density, per region its joules.
+
+    Raises:
+        InputError: an energy is not finite.
     """
     areas = _face_areas(surface)
     density = np.asarray(face_energy, dtype=np.float64) / np.where(areas > 0.0, areas, np.inf)
-    found = energy_map(surface, density, regions=regions)
+    at_vertices = smooth_to_vertices(surface, density)
+    peak = int(np.argmax(at_vertices))
     report: dict[str, Any] = {
-        "peak": found.peak.words,
-        "peak_j_per_m2": found.peak.density,
-        "lines": {
-            name: {"length_m": line.length, "mean_j_per_m2": line.mean, "peak_j_per_m2": line.peak}
-            for name, line in found.lines.items()
-        },
+        "peak": place_in_words(surface, peak),
+        "peak_j_per_m2": float(at_vertices[peak]),
+        "lines": {name: _along(surface, at_vertices, line) for name, line in surface.lines.items()},
     }
     if regions:
-        report["bricks"] = dict(found.regions)
+        energy = density * areas
+        report["bricks"] = {name: float(energy[faces].sum()) for name, faces in regions.items()}
     return report
+
+
+def _along(surface: Surface, density: FloatArray, line: IntArray) -> dict[str, float]:
+    """Return the length of a line [m], and the mean and the highest density (#V [J/m2]) on it, linear between its vertices."""
+    along, step = density[line], segment_lengths(surface.vertices[line])
+    length = float(step.sum())
+    integral = float((0.5 * (along[:-1] + along[1:]) * step).sum())
+    mean = integral / length if length > 0 else float(along.mean())
+    return {"length_m": length, "mean_j_per_m2": mean, "peak_j_per_m2": float(along.max())}
+
+
+def place_in_words(surface: Surface, vertex: int) -> str:
+    """Describe the place of a vertex for a pattern maker, such as "4 mm above bust line, 12 mm from princess front".
+
+    Distances to the two nearest lines are straight in space: near a line that is what a tape measures to less than a millimetre.
+    """
+    here = surface.vertices[vertex]
+    offsets = {name: nearest_on_polyline(here, surface.vertices[line]) - here for name, line in surface.lines.items()}
+    away = {name: float(np.linalg.norm(offset)) for name, offset in offsets.items()}
+    phrases = []
+    # Lines that are equally near, to the micrometre, stay in the surface's order.
+    for name in sorted(away, key=lambda name: round(away[name], 6))[:2]:
+        if away[name] < 1e-3:
+            phrases.append(f"on {name}")
+            continue
+        rise = -float(offsets[name][1]) / away[name]
+        # Within 45 degrees of the vertical a line lies above or below, else beside.
+        side = "above" if rise > np.sqrt(0.5) else "below" if rise < -np.sqrt(0.5) else "from"
+        phrases.append(f"{away[name] * 1e3:.0f} mm {side} {name}")
+    return ", ".join(phrases) or f"vertex {vertex} at ({', '.join(f'{x:.3f}' for x in here)}) m"
 
 
 def smooth_to_vertices(surface: Surface, face_density: ArrayLike, *, smoothing_length: float = 0.0) -> FloatArray:
@@ -183,13 +105,17 @@ def smooth_to_vertices(surface: Surface, face_density: ArrayLike, *, smoothing_l
 
     Returns:
         #V [J/m2]; 0 at vertices without a face of positive area.
+
+    Raises:
+        InputError: a density is not finite.
     """
     from scipy.sparse import diags_array
     from scipy.sparse.linalg import cg, spsolve
 
-    density = _checked_density(face_density, len(surface.faces), "face")
-    if not (np.isfinite(smoothing_length) and smoothing_length >= 0):
-        raise InputError(f"smoothing_length is a length in metres, 0 or more, got {smoothing_length!r}")
+    density = np.asarray(face_density, dtype=np.float64)
+    wrong = np.flatnonzero(~np.isfinite(density))
+    if len(wrong):
+        raise InputError(f"energy density of face {int(wrong[0])} is not finite: {density[wrong[0]]}")
     # Each face gives its vertices equal parts of its area [m2] and its energy [J].
     count = len(surface.vertices)
     is_corner = surface.faces >= 0
@@ -229,7 +155,7 @@ def smooth_to_vertices(surface: Surface, face_density: ArrayLike, *, smoothing_l
 
 def _diffusion_matrix(surface: Surface, area: FloatArray, length: float) -> tuple[csr_array, float]:
     """Return M + l^2/2 L, #V by #V, and the length of a typical edge [m]."""
-    from scipy.sparse import csr_array, diags_array
+    from scipy.sparse import diags_array
 
     triangles, _, weight = corner_triangles(surface.faces)
     triangle_area, product = _measured(surface, triangles)
@@ -251,143 +177,6 @@ def _diffusion_matrix(surface: Surface, area: FloatArray, length: float) -> tupl
     return (diags_array(area + joined.sum(axis=1)) - joined).tocsr(), float(np.sqrt(triangle_area.mean()))
 
 
-def integrate_faces(surface: Surface, face_density: ArrayLike, regions: Mapping[str, ArrayLike]) -> dict[str, float]:
-    """Return the energy of named face sets [J].
-
-    Args:
-        surface: the surface.
-        face_density: #F [J/m2].
-        regions: face indices (each counted once), or #F booleans, by name.
-    """
-    energy = _checked_density(face_density, len(surface.faces), "face") * _face_areas(surface)
-    totals = {}
-    for name, chosen in regions.items():
-        faces = np.asarray(chosen)
-        if faces.dtype == bool:
-            if faces.shape != energy.shape:
-                raise InputError(f"region {name!r}: {faces.shape[0]} flags for {len(energy)} faces; give one per face")
-            faces = np.flatnonzero(faces)
-        faces = np.unique(faces).astype(np.int64)
-        if len(faces) and (faces[0] < 0 or faces[-1] >= len(energy)):
-            wrong = int(faces[0] if faces[0] < 0 else faces[-1])
-            raise InputError(f"region {name!r}: face {wrong} does not exist; valid: 0 to {len(energy) - 1}")
-        totals[name] = float(energy[faces].sum())
-    return totals
-
-
-def integrate_along(surface: Surface, vertex_density: ArrayLike, line: ArrayLike) -> LineEnergy:
-    """Integrate the energy density along a line of vertices, linear between them.
-
-    Args:
-        surface: the surface.
-        vertex_density: #V [J/m2].
-        line: vertex indices in order, at least one; a closed line repeats its first.
-    """
-    density = _checked_density(vertex_density, len(surface.vertices), "vertex")
-    vertices = np.asarray(line)
-    if vertices.ndim != 1 or len(vertices) == 0:
-        raise InputError(f"a line is a row of vertex indices, at least one, got shape {vertices.shape}")
-    outside = np.flatnonzero((vertices < 0) | (vertices >= len(density)))
-    if len(outside):
-        raise InputError(f"line: vertex {int(vertices[outside[0]])} does not exist; valid: 0 to {len(density) - 1}")
-    along = density[vertices]
-    step = segment_lengths(surface.vertices[vertices])
-    length = float(step.sum())
-    integral = float((0.5 * (along[:-1] + along[1:]) * step).sum())
-    highest = int(np.argmax(along))
-    return LineEnergy(
-        length=length,
-        integral=integral,
-        mean=integral / length if length > 0 else float(along.mean()),
-        peak=float(along[highest]),
-        peak_vertex=int(vertices[highest]),
-    )
-
-
-def energy_peak(
-    surface: Surface,
-    vertex_density: ArrayLike,
-    *,
-    landmarks: Mapping[str, ArrayLike | int] | None = None,
-    up: ArrayLike = (0.0, 1.0, 0.0),
-) -> EnergyPeak:
-    """Return the vertex of highest density, and its place relative to the nearest lines and the nearest landmark.
-
-    Distances are straight in space: near a line that is what a tape measures to less than a millimetre.
-
-    Args:
-        surface: the surface.
-        vertex_density: #V [J/m2].
-        landmarks: named places: vertex indices or positions [m].
-        up: the direction in which something is "above".
-    """
-    density = _checked_density(vertex_density, len(surface.vertices), "vertex")
-    if len(density) == 0:
-        raise InputError("the surface has no vertices, so no peak")
-    vertex = int(np.argmax(density))
-    return _place(surface, vertex, float(density[vertex]), landmarks or {}, up)
-
-
-def place_in_words(surface: Surface, vertex: int) -> str:
-    """Describe the place of a vertex as a sentence for a pattern maker."""
-    return _place(surface, vertex, 0.0, {}, (0.0, 1.0, 0.0)).words
-
-
-def _place(
-    surface: Surface, vertex: int, density: float, landmarks: Mapping[str, ArrayLike | int], up: ArrayLike
-) -> EnergyPeak:
-    """Return the place of a vertex with its density."""
-    here = surface.vertices[vertex]
-    upwards = np.asarray(up, dtype=float)
-    norm = np.linalg.norm(upwards)
-    if upwards.shape != (3,) or not np.isfinite(norm) or norm <= 0:
-        raise InputError(f"up is a direction, three finite numbers, not all zero, got {up!r}")
-    offsets = {name: nearest_on_polyline(here, surface.vertices[line]) - here for name, line in surface.lines.items()}
-    marks = {}
-    for name, place in landmarks.items():
-        if isinstance(place, (int, np.integer)):
-            count = len(surface.vertices)
-            if not 0 <= place < count:
-                raise InputError(f"landmark {name!r}: vertex {place} does not exist; valid: 0 to {count - 1}")
-            marks[name] = surface.vertices[place]
-            continue
-        marks[name] = np.asarray(place, dtype=float)
-        if marks[name].shape != (3,) or not np.isfinite(marks[name]).all():
-            raise InputError(f"landmark {name!r} is a vertex index or three finite numbers [m], got {place!r}")
-    to_lines = _by_distance({name: float(np.linalg.norm(offset)) for name, offset in offsets.items()})
-    to_marks = _by_distance({name: float(np.linalg.norm(mark - here)) for name, mark in marks.items()})
-    # For example "4 mm above bust line, 12 mm from princess front; 13 mm from bust point".
-    phrases = []
-    for name, distance in list(to_lines.items())[:2]:
-        if distance < 1e-3:
-            phrases.append(f"on {name}")
-            continue
-        rise = -float(offsets[name] @ upwards / norm) / distance
-        # Within 45 degrees of the vertical a line lies above or below, else beside.
-        side = "above" if rise > np.sqrt(0.5) else "below" if rise < -np.sqrt(0.5) else "from"
-        phrases.append(f"{distance * 1e3:.0f} mm {side} {name}")
-    words = ", ".join(phrases)
-    if to_marks:
-        name, distance = next(iter(to_marks.items()))
-        mark = f"at {name}" if distance < 1e-3 else f"{distance * 1e3:.0f} mm from {name}"
-        words = f"{words}; {mark}" if words else mark
-    if not words:
-        words = f"vertex {vertex} at ({', '.join(f'{x:.3f}' for x in here)}) m"
-    return EnergyPeak(
-        vertex=vertex,
-        position=here.copy(),
-        density=density,
-        lines=to_lines,
-        landmarks=to_marks,
-        words=words,
-    )
-
-
-def _by_distance(distances: Mapping[str, float]) -> dict[str, float]:
-    # Lines that are equally near, to the micrometre, stay in the surface's order.
-    return dict(sorted(distances.items(), key=lambda item: round(item[1], 6)))
-
-
 @once_per_surface
 def _face_areas(surface: Surface) -> FloatArray:
     """Return #F, the areas of faces [m2]; that of a quad is the mean of both ways of splitting it."""
@@ -403,16 +192,6 @@ def _measured(surface: Surface, triangles: IntArray) -> tuple[FloatArray, FloatA
     area, product = np.empty(len(triangles)), np.empty((len(triangles), 3))
     launch_each(measure_triangles, len(triangles), [surface.vertices, triangles], [area, product])
     return area, product
-
-
-def _checked_density(values: ArrayLike, count: int, what: str) -> FloatArray:
-    density = np.asarray(values, dtype=float)
-    if density.shape != (count,):
-        raise InputError(f"energy density: one value per {what} expected, {count} of them, got shape {density.shape}")
-    wrong = np.flatnonzero(~np.isfinite(density))
-    if len(wrong):
-        raise InputError(f"energy density of {what} {int(wrong[0])} is not finite: {density[wrong[0]]}")
-    return density
 
 
 # The first cubes are so many edges wide; there are sums down to a level of at most so many cubes, which is solved.

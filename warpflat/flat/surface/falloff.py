@@ -6,10 +6,31 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.sparse import factor_symmetric
 from warpflat.flat.surface.half_edges import mesh_edges
 
-__all__ = ["falloff_weights"]
+__all__ = ["falloff_weights", "harmonic_values"]
+
+
+def harmonic_values(faces: IntArray, value: FloatArray, known: BoolArray) -> FloatArray:
+    """Return values that are known at some vertices of a mesh, each other one the mean of its neighbours'; 0 in parts without any.
+
+    Args:
+        faces: #F by 4, -1 last in a triangle.
+        value: #V, or #V by #N; 0 where it is not known.
+        known: #V.
+    """
+    from scipy.sparse import coo_matrix, diags
+
+    count, free, found = len(known), np.flatnonzero(~known), value.copy()
+    if len(free):
+        ends = mesh_edges(faces)
+        both = np.concatenate([ends[:, 0], ends[:, 1]]), np.concatenate([ends[:, 1], ends[:, 0]])
+        joined = coo_matrix((np.ones(2 * len(ends)), both), shape=(count, count)).tocsr()
+        laplacian = (diags(np.asarray(joined.sum(axis=1)).ravel()) - joined).tocsr()
+        found[free] = factor_symmetric(laplacian[free][:, free])(joined[free] @ value)
+    return found
 
 
 def falloff_weights(
@@ -26,20 +47,9 @@ def falloff_weights(
     Returns:
         #V, the values given, and harmonic in between.
     """
-    from scipy.sparse import coo_matrix, diags
-    from scipy.sparse.linalg import spsolve
-
     value, known = np.zeros(count), np.zeros(count, dtype=bool)
     for stop in stops:
         known[stop] = True
     for vertices, values in given:
         value[vertices], known[vertices] = values, True
-    free = np.flatnonzero(~known)
-    if len(free):
-        ends = mesh_edges(faces)
-        ones = np.ones(2 * len(ends))
-        rows, columns = np.concatenate([ends[:, 0], ends[:, 1]]), np.concatenate([ends[:, 1], ends[:, 0]])
-        joined = coo_matrix((ones, (rows, columns)), shape=(count, count)).tocsr()
-        laplacian = (diags(np.asarray(joined.sum(axis=1)).ravel()) - joined).tocsr()
-        value[free] = spsolve(laplacian[free][:, free].tocsc(), joined[free] @ value)
-    return value
+    return harmonic_values(faces, value, known)

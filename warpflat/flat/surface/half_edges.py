@@ -21,12 +21,10 @@ from warpflat.flat.surface.mesh import Surface, once_per_faces, read_only
 __all__ = [
     "HalfEdges",
     "border_edges",
-    "edge_faces",
     "four_columns",
     "half_edges",
     "half_edges_of",
     "mesh_edges",
-    "non_manifold_edges",
     "opposite_half_edges",
     "paired_half_edges",
     "read_only_view",
@@ -141,27 +139,6 @@ def sides_of(quads: IntArray) -> tuple[IntArray, IntArray]:
 def mesh_edges(faces: ArrayLike | HalfEdges) -> IntArray:
     """Return #E by 2, the unique edges as (lower, higher) vertex, sorted by the first, then the second; no diagonals."""
     return half_edges(faces).edges
-
-
-def edge_faces(faces: ArrayLike) -> tuple[IntArray, IntArray]:
-    """Return the edges (see :func:`mesh_edges`) and, #E by 2, the faces beside each, lower index first, -1 on the border.
-
-    An edge with more than two faces gets the two lowest; :func:`non_manifold_edges` finds those edges.
-    """
-    he = half_edges(faces)
-    beside = np.full((len(he.edges), 2), -1, dtype=np.int32)
-    order = stable_argsort(he.edge)
-    start = np.cumsum(he.count) - he.count
-    beside[:, 0] = he.face[order[start]]
-    second = he.count > 1
-    beside[second, 1] = he.face[order[start[second] + 1]]
-    return he.edges, beside
-
-
-def non_manifold_edges(faces: ArrayLike) -> IntArray:
-    """Return #N by 2, the edges with more than two faces, as (lower, higher) vertex."""
-    he = half_edges(faces)
-    return he.edges[he.count > 2]
 
 
 def border_edges(faces: ArrayLike) -> IntArray:

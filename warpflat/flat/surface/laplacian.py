@@ -17,11 +17,19 @@ from warpflat.core.sparse import factor_symmetric
 from warpflat.flat.surface.cells import make_cells
 from warpflat.flat.surface.mesh import Surface, once_per_surface
 
-__all__ = ["Laplacian", "cotangent_matrix", "factor_pays", "held_laplacian", "laplacian_of", "laplacian_solver"]
+__all__ = [
+    "MOST_FACTORED",
+    "Laplacian",
+    "cotangent_matrix",
+    "factor_pays",
+    "held_laplacian",
+    "laplacian_of",
+    "laplacian_solver",
+]
 
-# The most vertices of a surface that is factored: a factor takes 0.3 to 0.7 KB a vertex. L-BFGS over it is as fast as multigrid cycles on
-# isotropic grids of up to 10,000 vertices, and in other cloth, on triangles and on ragged pieces up to ten times as fast.
-_MOST_VERTICES = 100_000
+#: The most vertices of what is factored: a factor takes 0.3 to 0.7 KB a vertex. L-BFGS over it is as fast as multigrid cycles on isotropic
+#: grids of up to 10,000 vertices, and in other cloth, on triangles and on ragged pieces up to ten times as fast.
+MOST_FACTORED = 100_000
 
 # A cell counts as at least so high, over its length.
 _LEAST_HEIGHT = 1e-4
@@ -63,7 +71,7 @@ class Laplacian:
 
 def factor_pays(surface: Surface) -> bool:
     """Return whether a surface has so few vertices that it is worth while to factor its Laplacian."""
-    return len(surface.vertices) <= _MOST_VERTICES
+    return len(surface.vertices) <= MOST_FACTORED
 
 
 def laplacian_of(surface: Surface) -> Laplacian:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import wraps
 from pathlib import Path
@@ -12,9 +12,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.sums import range_offsets
 
 __all__ = [
     "Surface",
+    "join_surfaces",
     "once_per_faces",
     "once_per_surface",
     "read_only",
@@ -37,7 +39,7 @@ class Surface:
         faces: #F by 4, vertex indices, int32, consistently wound; a triangle has -1 in its last column.
         lines: feature lines by name: vertex indices along mesh edges, int32; a closed line repeats its first vertex.
         name: of the piece, in files and messages.
-        input_vertices: #I by 3, positions [m] as they were read, in their order, for files that refer to it.
+        input_vertices: #I by 3, positions [m] as they were read, in their order, for files that refer to it; the vertices if not given.
         input_index: #V, for each vertex its row in `input_vertices`.
         notes: repairs made when it was read, one sentence each.
         sources: files from which it was read; its own results never replace them.
@@ -48,11 +50,17 @@ class Surface:
     faces: IntArray
     lines: Mapping[str, IntArray] = field(default_factory=dict)
     name: str = "piece"
-    input_vertices: FloatArray
-    input_index: IntArray
+    input_vertices: FloatArray = None  # type: ignore[assignment]  # never None once made
+    input_index: IntArray = None  # type: ignore[assignment]
     notes: tuple[str, ...] = ()
     sources: tuple[Path, ...] = ()
     of_faces: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        """Take the vertices as those that were read, if these are not given."""
+        if self.input_vertices is None:
+            object.__setattr__(self, "input_vertices", self.vertices)
+            object.__setattr__(self, "input_index", np.arange(len(self.vertices), dtype=np.int32))
 
     def __repr__(self) -> str:
         lines = f", lines {', '.join(self.lines)}" if len(self.lines) in range(1, 9) else f", {len(self.lines)} lines"
@@ -66,6 +74,18 @@ class Surface:
     def is_quad(self) -> BoolArray:
         """#F, true for quads."""
         return self.faces[:, 3] >= 0
+
+
+def join_surfaces(surfaces: Sequence[Surface]) -> Surface:
+    """Return several surfaces as one, without their lines: vertices and faces of the first, then of the next."""
+    first = range_offsets([len(surface.vertices) for surface in surfaces])
+    return Surface(
+        vertices=np.concatenate([surface.vertices for surface in surfaces]),
+        faces=np.concatenate(
+            [np.where(s.faces >= 0, s.faces + at, -1) for s, at in zip(surfaces, first, strict=False)]
+        ),
+        name=" + ".join(surface.name for surface in surfaces),
+    )
 
 
 def once_per_surface(measure: Callable[[Surface], Result]) -> Callable[[Surface], Result]:

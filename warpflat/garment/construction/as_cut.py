@@ -10,21 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from warpflat.core import FloatArray, IntArray, guarded
-from warpflat.flat import (
-    DEFAULT_FABRIC,
-    CutPattern,
-    Fabric,
-    SewnPanel,
-    Surface,
-    area_vectors,
-    as_fabric,
-    distances_laid,
-    laid_as_cut,
-    read_sewn_panels,
-    triangulate,
-)
+from warpflat.flat import DEFAULT_FABRIC, Fabric, Surface, area_vectors, as_fabric, triangulate
 from warpflat.garment.construction.garment import Garment
+from warpflat.garment.construction.laid_as_cut import CutPattern, distances_laid, laid_as_cut
 from warpflat.garment.construction.sew_pieces import meeting_borders, name_seams
+from warpflat.garment.construction.sewn_panels import SewnPanel, read_sewn_panels
 from warpflat.garment.construction.to_pattern import pattern_of_garment
 from warpflat.pattern import Pattern, Seam
 

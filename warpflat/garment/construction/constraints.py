@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 
 from warpflat.core import FloatArray, InputError, IntArray, nearest, segment_lengths
-from warpflat.flat import (
+from warpflat.flat import grain_axes
+from warpflat.garment.construction.constraint_equations import (
     ConstraintEquations,
-    grain_axes,
     length_equations,
     level_equations,
     mirror_equations,
-    mirror_partners,
     one_group,
     seam_equations,
     shape_equations,
     smooth_equations,
     straight_equations,
 )
+from warpflat.garment.construction.mirror import mirror_partners
 
 if TYPE_CHECKING:
     from warpflat.flat import Flattening

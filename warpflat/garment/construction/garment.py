@@ -20,7 +20,10 @@ from warpflat.core import (
     polyline_length,
     write_report,
 )
-from warpflat.flat import BorderSeam, CutPattern, Flattening, even_sides, mirror_images, run_metrics, separate
+from warpflat.flat import Flattening, run_metrics, separate
+from warpflat.garment.construction.border_seams import BorderSeam
+from warpflat.garment.construction.laid_as_cut import CutPattern
+from warpflat.garment.construction.mirror import even_sides, mirror_images
 from warpflat.garment.construction.sewn import MeasuredSeam, Sewn, Stitching
 
 if TYPE_CHECKING:

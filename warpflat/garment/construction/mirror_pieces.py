@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.core import FloatArray, arc_lengths
-from warpflat.flat import mirror_plane
 from warpflat.garment.construction.edges import SAME_LINE
+from warpflat.garment.construction.mirror import mirror_plane
 from warpflat.pattern import Pattern, Piece, Seam, SeamSide
 
 if TYPE_CHECKING:

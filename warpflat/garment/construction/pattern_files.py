@@ -34,7 +34,8 @@ from warpflat.garment.construction.strips import CLOTH_WIDTH
 from warpflat.pattern import Shrinkage, enlarged
 
 if TYPE_CHECKING:
-    from warpflat.flat import BorderSeam, Flattening
+    from warpflat.flat import Flattening
+    from warpflat.garment.construction.border_seams import BorderSeam
     from warpflat.garment.construction.garment import Garment
     from warpflat.pattern import Cloth, DraftedGarment, FoundSeam, Pattern, WalkedSeam
 

@@ -11,28 +11,16 @@ from typing import Literal
 import numpy as np
 
 from warpflat.core import BoolArray, InputError, IntArray, arc_lengths, find_unused_name
-from warpflat.flat import (
-    SAME_PLACE,
-    BorderSeam,
-    Flattening,
-    Layer,
-    RelaxOptions,
-    Surface,
-    border_loops,
-    cut_straight,
-    even_sides,
-    find_band,
-    join_labels,
-    lies_within,
-    mirror_images,
-    surface_seams,
-)
+from warpflat.flat import SAME_PLACE, Flattening, Layer, RelaxOptions, Surface, border_loops, join_labels, lies_within
+from warpflat.garment.construction.border_seams import BorderSeam, surface_seams
 from warpflat.garment.construction.closed_cuts import seams_of_cuts
 from warpflat.garment.construction.constraints import Constraint, KeptGirth
 from warpflat.garment.construction.fullness import FullEdge, give_fullness
 from warpflat.garment.construction.garment import Garment
+from warpflat.garment.construction.mirror import even_sides, mirror_images
 from warpflat.garment.construction.sewing import sew
 from warpflat.garment.construction.sewn import Sewn, Stitching
+from warpflat.garment.construction.straight_band import cut_straight, find_band
 from warpflat.pattern import find_corners
 
 __all__ = ["Bands", "meeting_borders", "name_seams", "sew_pieces", "unsewn_borders", "unsewn_notes"]

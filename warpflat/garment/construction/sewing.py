@@ -24,8 +24,6 @@ from warpflat.flat import (
     CONTACT,
     STEPS,
     ConstrainedOutcome,
-    ConstraintEquations,
-    Correction,
     Flattening,
     Outcome,
     Relaxation,
@@ -34,20 +32,23 @@ from warpflat.flat import (
     cut_sides,
     factor_pays,
     falloff_weights,
-    girth_equations,
     given_options,
     grain_alignments,
     is_injective,
-    join_equations,
-    join_networks,
     join_surfaces,
     make_stage,
-    one_group,
     overlap_area,
     relax_under_equations,
+    stiffness_matrix,
+)
+from warpflat.garment.construction.constraint_equations import (
+    ConstraintEquations,
+    Correction,
+    girth_equations,
+    join_equations,
+    one_group,
     seam_equations,
     smooth_equations,
-    stiffness_matrix,
     stretch_equations,
 )
 from warpflat.garment.construction.constraints import (
@@ -57,6 +58,7 @@ from warpflat.garment.construction.constraints import (
     equations_of_constraint,
     find_piece,
 )
+from warpflat.garment.construction.join_networks import join_networks
 from warpflat.garment.construction.sewn import ConstraintResult, Sewn, Stitching
 
 __all__ = ["sew"]

@@ -77,7 +77,8 @@ from warpflat.pattern import (
 )
 
 if TYPE_CHECKING:
-    from warpflat.flat import BorderSeam, Crack, Flattening, Surface
+    from warpflat.flat import Crack, Flattening, Surface
+    from warpflat.garment.construction.border_seams import BorderSeam
     from warpflat.garment.construction.garment import Garment
     from warpflat.garment.construction.openings import OpeningPart
     from warpflat.garment.construction.sewn import Stitching

@@ -129,8 +129,8 @@ class Correction:
         """Return the garment, or the piece, with the corrected pattern."""
         return with_pattern(garment, self.after.cloth)
 
-    def measures(self, garment: Garment | Flattening) -> dict[str, object]:
-        """Return the entry `correction` of `metrics.json`."""
+    def measures(self, garment: Garment | Flattening | None = None) -> dict[str, object]:
+        """Return the entry `correction` of `metrics.json`; with the edges of the garment whose pattern it is, if it is given."""
         rows = [
             {
                 "misfit_m": each.misfit,
@@ -142,7 +142,7 @@ class Correction:
         ]
         return {
             "reason": self.reason, "fabric": self.after.cloth.fabric.name, "rounds": rows,
-            "seam_difference_m": self.seam_difference(), "edges": self.edges(garment),
+            "seam_difference_m": self.seam_difference(), "edges": {} if garment is None else self.edges(garment),
         }  # fmt: skip
 
 

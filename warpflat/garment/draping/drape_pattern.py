@@ -12,7 +12,8 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.core import FloatArray, InputError, nearest, polyline_length, reflected, short_repr, start_warp
-from warpflat.flat import Fabric, Surface, mirror_plane, triangulate, vertex_normals
+from warpflat.flat import Fabric, Surface, triangulate, vertex_normals
+from warpflat.garment.construction.mirror import mirror_plane
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.check_sewn import check_sewn
 from warpflat.garment.draping.continue_pieces import continue_pieces, hang_from_edges, hood_beside_head

@@ -17,6 +17,7 @@ from warpflat.garment.draping.frames import choose_frames, gap_scale
 from warpflat.garment.draping.result import Drape
 from warpflat.pattern import (
     LEAST_GAP,
+    LEAST_PRESSURE,
     PAGE_WIDTH,
     PIXELS_AROUND,
     SIDES,
@@ -126,7 +127,7 @@ def _maps(drapes: list[Drape]) -> dict[str, tuple[list[FloatArray], Scale]]:
             Scale.both_ways(np.concatenate(strains), areas, 0.5, most),
         ),
         "shear [degrees]": (shears, Scale.both_ways(np.concatenate(shears), areas, 0.5, most_sheared)),
-        _PRESSURE: (pressures, Scale.from_zero(np.concatenate(pressures), areas, 0.1)),
+        _PRESSURE: (pressures, Scale.from_zero(np.concatenate(pressures), areas, 1e-3 * LEAST_PRESSURE)),
     }
 
 

@@ -170,10 +170,8 @@ def join_pieces(
 
 def worn_surface(name: str, points: FloatArray, faces: IntArray) -> Surface:
     """Return a piece at places in space, #P by 3 [m], with its own faces, #F by 4 or 3."""
-    return Surface(
-        vertices=points, faces=np.pad(faces, ((0, 0), (0, 4 - faces.shape[1])), constant_values=-1).astype(np.int32), name=name,
-        input_vertices=points, input_index=np.arange(len(points), dtype=np.int32),
-    )  # fmt: skip
+    quads = np.pad(faces, ((0, 0), (0, 4 - faces.shape[1])), constant_values=-1).astype(np.int32)
+    return Surface(vertices=points, faces=quads, name=name)
 
 
 def pieces_of(garment: Garment | Flattening | Sequence[Flattening]) -> dict[str, Flattening]:

@@ -167,10 +167,7 @@ def _piece(
     lines = _lines(layout, corners, grid_vertices, edges)
     lines |= {leg: ids for dart, legs in fisheyes.items() for leg, ids in zip(_legs(dart), legs, strict=True)}
     fold = fold_among(edges, opened, name) if folded else None
-    surface = Surface(
-        vertices=vertices[grid_vertices], faces=corners, lines=lines, name=name, input_vertices=vertices[grid_vertices],
-        input_index=np.arange(len(grid_vertices), dtype=np.int32),
-    )  # fmt: skip
+    surface = Surface(vertices=vertices[grid_vertices], faces=corners, lines=lines, name=name)
     wished = datum or fold
     along = [line for line in lines if is_part_of(line, wished)] if wished else list(lines)[:1]
     if not along:

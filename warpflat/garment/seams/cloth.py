@@ -19,10 +19,10 @@ from warpflat.flat import (
     HalfEdges,
     Surface,
     SurfacePath,
-    area_vectors,
     border_loops,
     components,
     face_normals,
+    flat_areas,
     half_edges,
     join_labels,
     split_faces_along,
@@ -74,7 +74,7 @@ class Cloth:
     @cached_property
     def face_areas(self) -> FloatArray:
         """#F [m2]."""
-        return np.linalg.norm(area_vectors(self.vertices, self.faces), axis=1)
+        return flat_areas(self.vertices, self.faces)
 
     @property
     def face_normals(self) -> FloatArray:
@@ -234,8 +234,6 @@ class Cloth:
             vertices=self.vertices,
             faces=np.column_stack([self.faces, np.full(len(self.faces), -1)]).astype(np.int32),
             name="garment",
-            input_vertices=self.vertices,
-            input_index=np.arange(len(self.vertices), dtype=np.int32),
         )
 
     def drawn(self, path: SurfacePath) -> tuple[Cloth, Ids]:

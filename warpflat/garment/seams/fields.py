@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, csr_array, diags_array
 
 from warpflat.core import FloatArray, factor_symmetric, reflected
-from warpflat.flat import area_vectors, face_normals, nearest_on_triangles, vertex_normals
+from warpflat.flat import face_normals, flat_areas, nearest_on_triangles, vertex_normals
 
 __all__ = ["MirrorMap", "Operators", "mirror_map"]
 
@@ -58,7 +58,7 @@ class Operators:
     @cached_property
     def mass(self) -> FloatArray:
         """#V, the area of each vertex [m2]."""
-        area = np.linalg.norm(area_vectors(self.vertices, self.faces), axis=1) / 3.0
+        area = flat_areas(self.vertices, self.faces) / 3.0
         return np.maximum(np.bincount(self.faces.ravel(), np.repeat(area, 3), minlength=len(self.vertices)), 1e-300)
 
     @cached_property

@@ -345,8 +345,6 @@ def _surface_of(cloth: Cloth, anatomy: Anatomy, mesh: PieceMesh, whole: Surface,
         vertices=mesh.vertices.copy(),
         faces=faces,
         name=name,
-        input_vertices=mesh.vertices.copy(),
-        input_index=np.arange(len(mesh.vertices), dtype=np.int32),
         sources=whole.sources,
     )
     grain = _grain(piece, cloth, mesh, anatomy)

@@ -14,13 +14,13 @@ import numpy as np
 
 from warpflat.core import FloatArray, InputError
 from warpflat.pattern.drafting.dart_allowance import dart_allowance
-from warpflat.pattern.drafting.hem_allowance import find_hem_end, fold_hem
+from warpflat.pattern.drafting.hem_allowance import fold_hem
 from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT
 from warpflat.pattern.drafting.polygons import LOST, close_slits, half_plane, intersection, union, unit_vector
 from warpflat.pattern.drafting.sides import MITRE_REACH, Side, Wedge, allowance_strip, corner_fill, outline_points
 
 if TYPE_CHECKING:
-    from shapely import Geometry, Polygon
+    from shapely import Geometry
 
 __all__ = ["CutOutline", "cut_hole", "cut_outline"]
 
@@ -70,13 +70,17 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
             prolonged[side.name], added, remarks = dart_allowance(sides, strips, index, before, after, body)
             parts += added
             notes += remarks
-        else:
-            parts += _corner_allowance(sides, strips, index, after, body)
+        elif (hem := fold_hem(sides, strips, index, after, body)) is not None:
+            parts += hem
+        elif isinstance(follows := sides[after], Side):
+            a, b = unit_vector(side.points[-1] - side.points[-2]), unit_vector(follows.points[1] - follows.points[0])
+            fill = corner_fill(side.points[-1], a, b, side.width, follows.width)
+            parts += [] if fill is None else [fill]
     whole = close_slits(union([*parts, *strips]))
     for side in sides:
         if isinstance(side, Side) and side.kind == "fold":
             # Keep what lies on the piece's side of its fold.
-            half = half_plane(side.points[0], side.points[-1], body)
+            half = half_plane(side.points[0], side.points[-1], body.length + 2.0)
             over = float(shapely.distance(half, shapely.points(shapely.get_coordinates(body))).max())
             if over > FOLD_STRAIGHT:
                 raise InputError(
@@ -91,29 +95,6 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
     ring = shapely.simplify(shapely.Polygon(polygon.exterior), 2e-6)
     points = np.asarray(shapely.orient_polygons(ring).exterior.coords)[:-1]
     return CutOutline(points=points, notes=tuple(notes), prolonged=prolonged)
-
-
-def _corner_allowance(
-    sides: Sequence[Side | Wedge], strips: list[Geometry], index: int, after: int, body: Polygon
-) -> list[Geometry]:
-    """Return what is added where two edges meet; a folded hem's strips are trimmed in place."""
-    import shapely
-
-    side, follows = sides[index], sides[after]
-    if not isinstance(side, Side) or not isinstance(follows, Side):
-        return []
-    end = find_hem_end(sides, index, after)
-    if end is not None:
-        far = index - 1 if end.hem == index else (after + 1) % len(sides)
-        far_side = sides[far]
-        if isinstance(far_side, Side):
-            outside = strips[far]
-        else:
-            outside = shapely.Polygon(np.concatenate([far_side.left, far_side.right[1:]])).buffer(0)
-        return fold_hem(end, strips, body, outside)
-    a, b = unit_vector(side.points[-1] - side.points[-2]), unit_vector(follows.points[1] - follows.points[0])
-    fill = corner_fill(side.points[-1], a, b, side.width, follows.width)
-    return [] if fill is None else [fill]
 
 
 def cut_hole(ring: FloatArray, width: float) -> FloatArray | None:

@@ -114,19 +114,13 @@ def find_cracks(ring: FloatArray, corners: set[int], known: set[int]) -> list[tu
     Returns:
         For each the left mouth, the tip and the right mouth.
     """
-    turns = _Border(ring).turning_at_vertices()
-    step = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
-    count = len(ring)
-    found = []
-    for tip in np.flatnonzero(turns < -TIP).tolist():
+    border, count, found = _Border(ring), len(ring), []
+    for tip in np.flatnonzero(border.turning_at_vertices() < -TIP).tolist():
         if tip in known:
             continue
         left = next((k for k in range(1, count) if (tip - k) % count in corners), 0)
         right = next((k for k in range(1, count) if (tip + k) % count in corners), 0)
-        legs = (
-            float(sum(step[(tip - k) % count] for k in range(1, left + 1))),
-            float(sum(step[(tip + k) % count] for k in range(right))),
-        )
-        if left and right and abs(legs[0] - legs[1]) <= LEGS * max(legs):
+        legs = np.diff(border.along[count + tip + np.array([-left, 0, right])])
+        if left and right and abs(legs[0] - legs[1]) <= LEGS * legs.max():
             found.append(((tip - left) % count, tip, (tip + right) % count))
     return found

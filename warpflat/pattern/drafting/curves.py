@@ -17,8 +17,11 @@ from warpflat.core import (
     segment_lengths,
     turning_angles,
 )
+from warpflat.pattern.drafting.polygons import mapped
 
 __all__ = [
+    "CHORD",
+    "TOLERANCE",
     "Curve",
     "adjust_lengths",
     "as_cubic",
@@ -57,7 +60,7 @@ INSIDE, NEAR = (0.8, 0.5, 0.2, 0.0), 4.0
 KINK, KINK_AGAIN = np.radians(12.0), 2.0
 #: It is straight where it turns by less than this [rad]; elsewhere it gets so many chords for one.
 STRAIGHT, FINER = 1e-4, 8
-#: The chords by which a curve is drawn or cut stay this close [m] to it.
+#: The chords by which a curve is drawn, cut or read stay this close [m] to it.
 CHORD = 2e-5
 
 
@@ -122,7 +125,7 @@ class Curve:
 
     def transformed(self, matrix: FloatArray) -> Curve:
         """Return the curve under a 2 by 3 affine matrix."""
-        return Curve(bezier=self.bezier @ matrix[:, :2].T + matrix[:, 2], straight=self.straight)
+        return Curve(bezier=mapped(self.bezier, matrix), straight=self.straight)
 
     def reversed(self) -> Curve:
         """Return the curve run the other way."""

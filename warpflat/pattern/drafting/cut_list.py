@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from warpflat.pattern.drafting.drafted import DraftedPiece
 from warpflat.pattern.drafting.sewing_tasks import piece_titles
 
-__all__ = ["CutEntry", "cloths_of", "cut_list"]
+__all__ = ["CutEntry", "cloths_of", "cut_list", "turned_over"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,16 +35,21 @@ def cloths_of(piece: DraftedPiece) -> dict[str, int]:
     return {piece.piece.fabric: piece.piece.quantity, **piece.piece.also}
 
 
+def turned_over(piece: DraftedPiece, quantity: int) -> list[bool]:
+    """Return of each copy of a piece whether it is cut turned over: every second one of pairs."""
+    pairs = piece.piece.paired and not piece.piece.on_fold and quantity % 2 == 0
+    return [pairs and k % 2 == 1 for k in range(quantity)]
+
+
 def cut_list(pieces: Sequence[DraftedPiece]) -> dict[str, list[CutEntry]]:
     """Return by cloth what is cut from it, the shell first."""
     titles = piece_titles([piece.piece for piece in pieces])
     found: dict[str, list[CutEntry]] = {}
     for piece in pieces:
-        pairs = piece.piece.paired and not piece.piece.on_fold
         for cloth, quantity in cloths_of(piece).items():
             entry = CutEntry(
                 piece=piece.name, title=titles[piece.name], quantity=quantity, on_fold=piece.piece.on_fold,
-                mirrored=quantity // 2 if pairs and quantity % 2 == 0 else 0,
+                mirrored=sum(turned_over(piece, quantity)),
             )  # fmt: skip
             found.setdefault(cloth, []).append(entry)
     return found

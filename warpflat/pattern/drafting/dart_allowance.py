@@ -7,17 +7,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, arc_lengths
+from warpflat.core import FloatArray, InputError, points_at_lengths
 from warpflat.pattern.drafting.hem_allowance import HEM_SLANT
 from warpflat.pattern.drafting.polygons import (
     GRID,
     angle_between,
     cut_off,
     intersection,
+    normal_towards,
     parallelogram,
     polygons_only,
     reflect,
-    rotate,
+    rotation,
     union,
     unit_vector,
 )
@@ -95,7 +96,7 @@ def _prolonged_legs(wedge: Wedge, left: Side, right: Side) -> tuple[FloatArray, 
     bend = (angle_between(hem_left, to_left) + angle_between(hem_right, to_right) - above) / 2
     if abs(bend) > HEM_SLANT:
         return to_left, to_right
-    return rotate(to_left, -bend), rotate(to_right, bend)
+    return rotation(-bend) @ to_left, rotation(bend) @ to_right
 
 
 def _half_cap(
@@ -117,8 +118,7 @@ def _half_cap(
     tip, near = wedge.tip, unit_vector(mouth - wedge.tip)
     ends = [tip + radius * near, tip + radius * wedge.middle]
     half: Geometry = shapely.Polygon([tip, *ends])
-    outwards = np.array([-near[1], near[0]])
-    outwards = outwards if outwards @ wedge.middle < 0 else -outwards
+    outwards = normal_towards(near, -wedge.middle)
     if beyond @ outwards > 0:
         half = union([half, shapely.Polygon([mouth, mouth + radius * near, mouth + radius * beyond])])
     elif beyond @ outwards < 0:
@@ -159,16 +159,12 @@ def _end_at_leg(
 
     if width <= 0:
         return strip, shapely.Polygon()
-    inwards = np.array([-leg[1], leg[0]])
-    inwards = inwards if inwards @ (other_mouth - mouth) > 0 else -inwards
+    inwards = normal_towards(leg, other_mouth - mouth)
     trimmed = cut_off(strip, mouth, leg, inwards, 3 * width)
-    out = np.array([along[1], -along[0]])
-    out = out if out @ leg > 0 else -out
-    run_on = parallelogram(mouth, along, (0, MITRE_REACH * width), out, (0, width))
+    run_on = parallelogram(mouth, along, (0, MITRE_REACH * width), normal_towards(along, leg), (0, width))
     return trimmed, cut_off(run_on, mouth, leg, inwards, 3 * width)
 
 
 def _secant_direction(line: FloatArray, length: float) -> FloatArray:
     """Return the unit vector from a line's first point to the one at `length` [m] along it, or to its last."""
-    arc = arc_lengths(line)
-    return unit_vector(np.array([np.interp(length, arc, line[:, k]) for k in (0, 1)]) - line[0])
+    return unit_vector(points_at_lengths(line, length) - line[0])

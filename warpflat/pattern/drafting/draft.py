@@ -8,11 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
-from itertools import chain
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, arc_lengths, optional_step
+from warpflat.core import FloatArray, InputError, optional_step, polyline_length
 from warpflat.pattern.drafting.allowance import cut_hole, cut_outline
 from warpflat.pattern.drafting.curves import TOLERANCE, Curve
 from warpflat.pattern.drafting.drafted import (
@@ -24,13 +23,7 @@ from warpflat.pattern.drafting.drafted import (
     Notch,
     SeamReport,
 )
-from warpflat.pattern.drafting.drafted_darts import (
-    dart_legs,
-    dart_line,
-    dart_notes,
-    fisheye_legs,
-    smooth_fisheye,
-)
+from warpflat.pattern.drafting.drafted_darts import dart_notes, draft_dart, fisheye_legs, fold_darts, smooth_fisheye
 from warpflat.pattern.drafting.fitting import (
     ALIKE,
     TOLERANCES,
@@ -46,6 +39,7 @@ from warpflat.pattern.drafting.notches import cut_darts, dart_notches, seam_notc
 from warpflat.pattern.drafting.piece_parts import Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam
 from warpflat.pattern.drafting.placement import default_grain, place_label
+from warpflat.pattern.drafting.polygons import mapped, upright
 from warpflat.pattern.drafting.seam_difference import SEAM_TOLERANCE
 from warpflat.pattern.drafting.sides import Side, Wedge
 from warpflat.pattern.drafting.truing import CornerReport, true_corners
@@ -138,19 +132,7 @@ def draft_half(
 
 def relabelled(piece: DraftedPiece, garment: str, joints: Sequence[FloatArray]) -> DraftedPiece:
     """Return a piece with its label where no joint of two sheets (2 by 2 [m] each) crosses it."""
-    legs = [piece.edge(leg).line for dart in piece.darts for leg in (dart.dart.left, dart.dart.right)]
-    holes = [cutout.sew_line for cutout in piece.cutouts.values()] + list(piece.fisheyes.values())
-    return replace(
-        piece,
-        label=place_label(
-            replace(piece.piece, edges=[replace(edge.edge, allowance=edge.width) for edge in piece.edges]),
-            garment,
-            (piece.sew_line, piece.cut_line),
-            holes,
-            [piece.grain, *piece.internal_lines.values(), *legs, *joints],
-            [edge.line for edge in piece.fold_edges],
-        ),
-    )
+    return replace(piece, label=place_label(piece, garment, joints))
 
 
 def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance: float | None) -> DraftedPiece:
@@ -158,12 +140,11 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
     import shapely
 
     frame = _frame(piece)
-    darts = dart_legs(piece, edges)
-    drafted_legs = {leg.name: leg for legs in darts.values() for leg in (legs.left, legs.right)}
-    edges = tuple(drafted_legs.get(edge.name, edge) for edge in edges)
+    edges, wedges = fold_darts(piece, edges)
+    by_name = {edge.name: edge for edge in edges}
     # The outline in order; a wedge stands for both legs of a folded dart.
-    folded = {legs.dart.left: legs.wedge for legs in darts.values() if legs.wedge is not None}
-    right_legs = {legs.dart.right for legs in darts.values() if legs.wedge is not None}
+    folded = {dart.left: wedges[dart.name] for dart in piece.darts if dart.name in wedges}
+    right_legs = {dart.right for dart in piece.darts if dart.name in wedges}
     sides: list[Side | Wedge] = []
     for edge in edges:
         if edge.name in folded:
@@ -171,8 +152,12 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         elif edge.name not in right_legs:
             sides.append(Side(name=edge.name, points=edge.line, width=edge.width, kind=edge.kind))
     cut = cut_outline(sides)
-    drafted_darts = tuple(dart_line(legs, cut.points) for legs in darts.values())
-    holes = {hole.name: _moved(hole.points, frame) for hole in piece.holes}
+    legs = [(by_name[dart.left], by_name[dart.right]) for dart in piece.darts]
+    darts = tuple(
+        draft_dart(dart, left.line, right.line, wedges.get(dart.name), cut.points)
+        for dart, (left, right) in zip(piece.darts, legs, strict=True)
+    )
+    holes = {hole.name: mapped(hole.points, frame) for hole in piece.holes}
     fisheyes = {hole.name: smooth_fisheye(holes[hole.name], tolerance) for hole in piece.holes if hole.kind == "dart"}
     cutouts = {}
     for hole in (hole for hole in piece.holes if hole.kind == "cutout"):
@@ -182,59 +167,50 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         cutouts[hole.name] = DraftedCutout(
             sew_line=points, cut_line=points if line is None else line, width=0.0 if line is None else hole.width
         )
-    lines = {name: _moved(line, frame) for name, line in piece.internal_lines.items()}
+    lines = {name: mapped(line, frame) for name, line in piece.internal_lines.items()}
     internal = {name: smooth_line(line) if tolerance is None else line for name, line in lines.items()}
     sew_line = np.concatenate([edge.line[:-1] for edge in edges])
-    grain = None if piece.grain is None else _moved(piece.grain, frame)
+    grain = None if piece.grain is None else mapped(piece.grain, frame)
     # The middle of a curved piece, such as a facing, lies outside it.
     if grain is None or not shapely.Polygon(sew_line).buffer(GRAIN_ON_BORDER).covers(shapely.LineString(grain)):
         grain = default_grain(sew_line, list(holes.values()))
     grain = _beside_lines(grain, list(internal.values()), sew_line)
-    leg_lines = [np.concatenate([legs.left.line, legs.right.line]) for legs in darts.values()]
-    widened = replace(piece, edges=[replace(edge.edge, allowance=edge.width) for edge in edges])
     # Pleats are not marked through the cloth.
-    drilled = [DrillHole(name=dart.dart.name, at=dart.tip) for dart in drafted_darts if dart.dart.pleat is None]
+    drilled = [DrillHole(name=dart.dart.name, at=dart.tip) for dart in darts if dart.dart.pleat is None]
     drilled += [
         DrillHole(name=name, at=end) for name, line in fisheyes.items() for end in fisheye_legs(line)[0][[0, -1]]
     ]
     uneven = []
     for name, line in fisheyes.items():
-        apart = abs(float(np.subtract(*(arc_lengths(leg)[-1] for leg in fisheye_legs(line)))))
-        if apart > SEAM_TOLERANCE:
-            uneven.append(f"dart {name}: its sides differ by {apart * 1000:.1f} mm")
+        first, second = map(polyline_length, fisheye_legs(line))
+        if abs(first - second) > SEAM_TOLERANCE:
+            uneven.append(f"dart {name}: its sides differ by {abs(first - second) * 1000:.1f} mm")
     # What even the widest tolerance leaves wavy.
     wavy = [e.name for e in edges if tolerance is None and e.tolerance > TOLERANCE and is_wavy(e.curve)]
     ragged = [
         f"the border stays ragged at {', '.join(wavy)}: no smooth line of the right length keeps within "
         f"{TOLERANCES[-1] * 1000:.0f} mm of it; a cut along the rows of the mesh, or a finer mesh, may help"
     ]
-    return DraftedPiece(
+    drafted = DraftedPiece(
         piece=piece,
         frame=frame,
         edges=edges,
         cut_line=cut.points,
-        darts=drafted_darts,
+        darts=darts,
         drill_holes=(
             *drilled,
-            *(DrillHole(name=name, at=_moved(at[None], frame)[0]) for name, at in piece.marks.items()),
+            *(DrillHole(name=name, at=mapped(at[None], frame)[0]) for name, at in piece.marks.items()),
         ),
-        notches=dart_notches(piece, {name: legs.wedge for name, legs in darts.items() if legs.wedge is not None}, cut),
+        notches=dart_notches(piece, wedges, cut),
         internal_lines=internal,
         cutouts=cutouts,
         fisheyes=fisheyes,
         grain=grain,
-        label=place_label(
-            widened,
-            garment,
-            (sew_line, cut.points),
-            list(holes.values()),
-            [grain, *internal.values(), *leg_lines],
-            [edge.line for edge in edges if edge.kind == "fold"],
-        ),
+        label=Label(at=np.zeros(2), lines=()),
         notes=(
             *cut.notes,
             *(ragged if wavy else ()),
-            *chain.from_iterable(map(dart_notes, darts.values())),
+            *(note for dart, both in zip(darts, legs, strict=True) for note in dart_notes(dart, *both)),
             *[
                 f"{hole.name} is too small for an allowance of {hole.width * 1000:g} mm: it is cut on its sewing line"
                 for hole in piece.holes
@@ -243,6 +219,7 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
             *uneven,
         ),
     )
+    return relabelled(drafted, garment, ())
 
 
 def _beside_lines(grain: FloatArray, lines: Sequence[FloatArray], sew_line: FloatArray) -> FloatArray:
@@ -265,11 +242,7 @@ def _frame(piece: Piece) -> FloatArray:
     The fixed point is the lower end of the fold, else of the longest straight edge along the grain (a centre back),
     else the middle of the lower border.
     """
-    if piece.grain is None:
-        turn = np.eye(2)
-    else:
-        x, y = (piece.grain[1] - piece.grain[0]) / np.linalg.norm(piece.grain[1] - piece.grain[0])
-        turn = np.array([[y, -x], [x, y]])
+    turn = np.eye(2) if piece.grain is None else upright(piece.grain[1] - piece.grain[0])
     outline = piece.outline @ turn.T
     low, high = outline.min(axis=0), outline.max(axis=0)
     anchor = np.array([(low[0] + high[0]) / 2, low[1]])
@@ -288,11 +261,6 @@ def _frame(piece: Piece) -> FloatArray:
     return np.column_stack([turn, -anchor])
 
 
-def _moved(points: FloatArray, frame: FloatArray) -> FloatArray:
-    """Map points (#P by 2 [m]) into the frame."""
-    return points @ frame[:, :2].T + frame[:, 2]
-
-
 def _fitted_edges(
     pieces: Sequence[Piece], seams: Sequence[Seam], tolerance: float | None, *, true: bool
 ) -> tuple[dict[str, tuple[DraftedEdge, ...]], list[CornerReport]]:
@@ -300,7 +268,7 @@ def _fitted_edges(
     lines: dict[tuple[str, str], FloatArray] = {}
     for piece in pieces:
         frame = _frame(piece)
-        lines |= {(piece.name, edge.name): _moved(edge.points, frame) for edge in piece.edges}
+        lines |= {(piece.name, edge.name): mapped(edge.points, frame) for edge in piece.edges}
     fitted = fit_edges(pieces, lines, seams, tolerance)
     curves = equal_sides(pieces, seams, {key: curve for key, (curve, _) in fitted.items()})
     corners = list[CornerReport]()

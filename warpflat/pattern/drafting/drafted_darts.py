@@ -3,65 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, arc_lengths
+from warpflat.core import FloatArray, resample
 from warpflat.flat import are_curved
-from warpflat.pattern.drafting.curves import TOLERANCE, fit_curve
+from warpflat.pattern.drafting.curves import TOLERANCE, farthest, fit_curve
 from warpflat.pattern.drafting.dart_allowance import WIDEST_DART
 from warpflat.pattern.drafting.drafted import DraftedDart, DraftedEdge, drawn_leg
-from warpflat.pattern.drafting.piece_parts import SAME_POINT, Dart
+from warpflat.pattern.drafting.piece_parts import DEFAULT_ALLOWANCE, SAME_POINT, Dart
 from warpflat.pattern.drafting.pieces import Piece
 from warpflat.pattern.drafting.seam_difference import SEAM_TOLERANCE
 from warpflat.pattern.drafting.sides import Wedge
 
-__all__ = ["DartLegs", "dart_legs", "dart_line", "dart_notes", "fisheye_legs", "smooth_fisheye"]
+__all__ = ["dart_notes", "draft_dart", "fisheye_legs", "fold_darts", "smooth_fisheye"]
 
 
-#: Allowance [m] of the legs of a dart that is cut away, where they name none, and the least width between both
-#: allowances.
-LEG_ALLOWANCE, LEAST_WASTE = 0.010, 0.005
+#: The least width [m] between the allowances of both legs of a dart that is cut away.
+LEAST_WASTE = 0.005
 #: Points of the fold between curved legs.
 FOLD_POINTS = 33
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class DartLegs:
-    """A dart with its drafted legs.
+def fold_darts(piece: Piece, edges: Sequence[DraftedEdge]) -> tuple[tuple[DraftedEdge, ...], dict[str, Wedge]]:
+    """Decide which darts of a piece are folded: return its edges, whose legs have their allowance, and by dart what is folded.
 
-    Attributes:
-        dart: as it came in.
-        left, right: the legs, left from the border, right to the border.
-        wedge: what is folded; None where the dart is cut away.
+    Legs of folded darts have no allowance, those of others a seam's.
     """
-
-    dart: Dart
-    left: DraftedEdge
-    right: DraftedEdge
-    wedge: Wedge | None
-
-    @property
-    def mouth(self) -> float:
-        """Opening of the dart at the border [m]."""
-        return float(np.linalg.norm(self.left.line[0] - self.right.line[-1]))
-
-    @property
-    def bend(self) -> float:
-        """Largest distance of a leg from its chord [m]."""
-        import shapely
-
-        return max(
-            float(shapely.distance(shapely.LineString(e.line[[0, -1]]), shapely.points(e.line)).max())
-            for e in (self.left, self.right)
-        )
-
-
-def dart_legs(piece: Piece, edges: Sequence[DraftedEdge]) -> dict[str, DartLegs]:
-    """Decide which darts of a piece are folded, and give all legs their allowance: none if folded, else a seam's."""
-    by_name = {edge.name: edge for edge in edges}
-    found = {}
+    by_name, wedges = {edge.name: edge for edge in edges}, dict[str, Wedge]()
     for dart in piece.darts:
         left, right = by_name[dart.left], by_name[dart.right]
         # A wedge is pressed downwards, or towards the middle if the dart runs along the grain.
@@ -69,32 +39,29 @@ def dart_legs(piece: Piece, edges: Sequence[DraftedEdge]) -> dict[str, DartLegs]
         away = np.abs((left.line[0] + right.line[-1]) / 2 - left.line[-1])
         fold_to = dart.fold_to or ("left" if (y < v if away[0] > away[1] else abs(x) < abs(u)) else "right")
         wedge = Wedge(name=dart.name, left=left.line, right=right.line, fold_to=fold_to)
-        legs = DartLegs(dart=dart, left=left, right=right, wedge=wedge)
         # A dart is cut away if its mouth is so wide that something is left between the legs' allowances. Legs that are one
         # line (a dart of no width) have nothing to fold.
-        widths = _leg_width(left) + _leg_width(right)
-        has_room = widths == 0 or legs.mouth >= widths + LEAST_WASTE
+        given = {leg.name: leg.edge.allowance for leg in (left, right)}
+        widths = {name: DEFAULT_ALLOWANCE["seam"] if width is None else width for name, width in given.items()}
+        both, mouth = sum(widths.values()), float(np.linalg.norm(left.line[0] - right.line[-1]))
+        has_room = both == 0 or mouth >= both + LEAST_WASTE
         folded = SAME_POINT < wedge.opening <= WIDEST_DART and not (dart.cut and dart.pleat is None and has_room)
-        found[dart.name] = replace(
-            legs,
-            left=replace(left, width=0.0 if folded else _leg_width(left)),
-            right=replace(right, width=0.0 if folded else _leg_width(right)),
-            wedge=wedge if folded else None,
-        )
-    return found
+        if folded:
+            wedges[dart.name] = wedge
+        for name, width in widths.items():
+            by_name[name] = replace(by_name[name], width=0.0 if folded else width)
+    return tuple(by_name.values()), wedges
 
 
-def _leg_width(leg: DraftedEdge) -> float:
-    return LEG_ALLOWANCE if leg.edge.allowance is None else leg.edge.allowance
-
-
-def dart_line(legs: DartLegs, cut_line: FloatArray) -> DraftedDart:
-    """Draw the line on which a dart is folded, from its tip to the cut line (#P by 2 [m])."""
+def draft_dart(
+    dart: Dart, left: FloatArray, right: FloatArray, wedge: Wedge | None, cut_line: FloatArray
+) -> DraftedDart:
+    """Draft a dart with the line on which it is folded, from its tip to the cut line (#P by 2 [m] each), if it has a wedge."""
     import shapely
 
-    left, right, wedge = legs.left.line, legs.right.line, legs.wedge
+    opening = float(np.linalg.norm(left[0] - right[-1]))
     if wedge is None:
-        return DraftedDart(dart=legs.dart, tip=left[-1], fold=None, fold_to="", opening=legs.mouth)
+        return DraftedDart(dart=dart, tip=left[-1], fold=None, fold_to="", opening=opening)
     reach = float(np.linalg.norm(cut_line - wedge.tip, axis=1).max()) + 0.01
     ray = shapely.LineString([wedge.tip, wedge.tip + reach * wedge.middle]).intersection(shapely.Polygon(cut_line))
     parts = [part for part in shapely.get_parts(ray) if part.length > 0]
@@ -105,34 +72,27 @@ def dart_line(legs: DartLegs, cut_line: FloatArray) -> DraftedDart:
     if are_curved(left, right):
         # The middle line of two lines with one start, by shares of their lengths.
         shares = np.linspace(0.0, 1.0, FOLD_POINTS)
-        sides = [
-            np.column_stack([np.interp(shares * arc[-1], arc, line[:, k]) for k in (0, 1)])
-            for line, arc in ((line, arc_lengths(line)) for line in (left[::-1], right))
-        ]
-        fold = np.concatenate([np.asarray((sides[0] + sides[1]) / 2), fold[1:]])
-    if legs.dart.pleat is not None:
-        fold = drawn_leg(fold[::-1], legs.dart.pleat)[::-1]
-    return DraftedDart(dart=legs.dart, tip=wedge.tip, fold=fold, fold_to=wedge.fold_to, opening=legs.mouth)
+        fold = np.concatenate([(resample(left[::-1], shares) + resample(right, shares)) / 2, fold[1:]])
+    if dart.pleat is not None:
+        fold = drawn_leg(fold[::-1], dart.pleat)[::-1]
+    return DraftedDart(dart=dart, tip=wedge.tip, fold=fold, fold_to=wedge.fold_to, opening=opening)
 
 
-def dart_notes(legs: DartLegs) -> list[str]:
+def dart_notes(drafted: DraftedDart, left: DraftedEdge, right: DraftedEdge) -> list[str]:
     """Return what the cutter should know of a dart whose legs have their allowance."""
-    dart, left, right = legs.dart, legs.left, legs.right
-    notes = []
+    dart, mouth, notes = drafted.dart, f"{drafted.opening * 1000:.0f} mm", list[str]()
+    bend = f"{max(farthest(leg.line[[0, -1]], leg.line) for leg in (left, right)) * 1000:.0f} mm"
     if dart.pleat is None and abs(left.length - right.length) > SEAM_TOLERANCE:
         notes.append(f"dart {dart.name}: its legs differ by {abs(left.length - right.length) * 1000:.1f} mm")
-    if legs.wedge is None and left.width > 0:
-        why = f"its legs bend by {legs.bend * 1000:.0f} mm" if dart.cut else "it opens too wide"
+    if drafted.fold is None and left.width > 0:
+        why = f"its legs bend by {bend}" if dart.cut else "it opens too wide"
         notes.append(f"dart {dart.name} is cut away, not folded: {why}; sew its legs as a seam")
     if dart.pleat is not None:
-        return [
-            *notes,
-            f"pleat {dart.name}: fold {legs.mouth * 1000:.0f} mm, sew {dart.pleat * 1000:.0f} mm down from the edge",
-        ]
-    if legs.wedge is not None and dart.cut:
+        notes.append(f"pleat {dart.name}: fold {mouth}, sew {dart.pleat * 1000:.0f} mm down from the edge")
+    elif drafted.fold is not None and dart.cut:
         notes.append(
-            f"dart {dart.name} is folded, not cut away: its mouth of {legs.mouth * 1000:.0f} mm has no room for the "
-            f"allowances of its legs, which bend by {legs.bend * 1000:.0f} mm; pin leg on leg"
+            f"dart {dart.name} is folded, not cut away: its mouth of {mouth} has no room for the "
+            f"allowances of its legs, which bend by {bend}; pin leg on leg"
         )
     return notes
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core import FloatArray, name_without_number, polyline_length, resample, without_side
+from warpflat.core import FloatArray, name_without_number, polyline_length, resample, unit, without_side
 from warpflat.pattern.drafting.curves import Curve, fit_curve
 from warpflat.pattern.drafting.draft import nest_label
 from warpflat.pattern.drafting.drafted import DraftedEdge, DraftedPiece
@@ -18,6 +18,7 @@ from warpflat.pattern.drafting.label import TAILS, Label, Words, text_width
 from warpflat.pattern.drafting.measures import name_in_units
 from warpflat.pattern.drafting.piece_parts import HEMMED_LEVELS, LEFT_OUT
 from warpflat.pattern.drafting.placement import LabelRoom, Spot, spots_along
+from warpflat.pattern.drafting.polygons import parallelogram
 from warpflat.pattern.drafting.words import translate, translate_name
 
 if TYPE_CHECKING:
@@ -96,14 +97,8 @@ class Drawing:
 
 def draw_piece(piece: DraftedPiece, paper: OnPaper | None = None) -> Drawing:
     """Draw one piece in one size; `paper` where it is printed."""
-    strokes = [
-        *_cut_strokes(piece, open_folds=paper is not None),
-        *(_edge_stroke(piece, edge) for edge in piece.edges if paper is None or edge.kind != "fold"),
-        *_cutout_sew_strokes(piece),
-        *_detail_strokes(piece),
-    ]
-    more, words = _annotations(piece, piece.label, piece.label.words(), paper)
-    return Drawing(piece=piece, strokes=(*strokes, *more), words=tuple(words))
+    written = _Annotations(piece, piece.label, piece.label.words(), paper)
+    return Drawing(piece=piece, strokes=(*_strokes(piece, paper), *written.strokes), words=tuple(written.words))
 
 
 def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) -> tuple[Drawing, ...]:
@@ -115,72 +110,84 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
         return (draw_piece(pieces[0], paper),)
     import shapely
 
+    middle = pieces[len(pieces) // 2]
+    longest = max(pieces, key=lambda piece: sum(edge.length for edge in piece.fold_edges))
+    edge, joints = _widest_edge(pieces), () if paper is None else paper.joints
+    sizes = ", ".join(piece.size for piece in pieces)
     drawings = []
-    middle = len(pieces) // 2
-    longest = max(pieces, key=lambda piece: sum(polyline_length(edge.line) for edge in piece.fold_edges))
-
-    def shift_across(name: str) -> float:
-        middles = [resample(piece.edge(name).line, 0.5) for piece in (pieces[0], pieces[-1])]
-        start, end = pieces[0].edge(name).line[[0, -1]]
-        along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-12)
-        shift = middles[1] - middles[0]
-        return abs(float(shift[0] * along[1] - shift[1] * along[0]))
-
-    # Where the sizes lie farthest apart a size is easiest to read off its line.
-    names = [e.name for e in pieces[0].edges if e.kind not in ("fold", "dart")]
-    shared = [name for name in names if all(name in {e.name for e in piece.edges} for piece in pieces)]
-    edge = max(shared, key=lambda name: shift_across(name) * pieces[0].edge(name).length ** 0.5, default="")
     for index, piece in enumerate(pieces):
+        # Dashes of several sizes upon each other would be a full line.
         strokes = [
-            *_cut_strokes(piece, open_folds=paper is not None),
-            *(
-                replace(_edge_stroke(piece, e), hidden=e.kind not in ("dart", "fold"))
-                for e in piece.edges
-                if paper is None or e.kind != "fold"
-            ),
-            *(replace(line, hidden=True) for line in _cutout_sew_strokes(piece)),
-            *_detail_strokes(piece),
+            replace(line, hidden=line.hidden or (line.role == "fold" and piece is not longest))
+            for line in _strokes(piece, paper, nested=True)
         ]
-        if piece is not longest:
-            # Dashes of several sizes upon each other would be a full line.
-            strokes = [replace(line, hidden=True) if line.role == "fold" else line for line in strokes]
         words: list[Words] = []
-        if index == middle:
+        if piece is middle:
             label = nest_label(pieces)
-            sizes = ", ".join(p.size for p in pieces)
-            # The label names all sizes in place of its own, no wider than it is.
-            rows = label.words()
-            for number, row in enumerate(rows):
-                one_size, all_sizes = translate("size {size}", size=piece.size), translate("sizes {sizes}", sizes=sizes)
-                if row.text == one_size[0].upper() + one_size[1:]:
-                    text = all_sizes[0].upper() + all_sizes[1:]
-                    height = row.height * min(1.0, label.width / text_width(text, row.height))
-                    rows[number] = replace(row, text=text, height=height)
             others = [stroke for other in pieces if other is not piece for stroke in _detail_strokes(other)]
             slits = [shapely.LineString(stroke.points) for stroke in others if stroke.role == "notch"]
-            more, words = _annotations(piece, label, rows, paper, borders=False, slits=slits)
-            strokes += more
+            # It names all sizes in place of its own, no wider than it is.
+            one, every = translate("size {size}", size=piece.size), translate("sizes {sizes}", sizes=sizes)
+            text, rows = every[0].upper() + every[1:], label.words()
+            for number, row in enumerate(rows):
+                if row.text == one[0].upper() + one[1:]:
+                    height = row.height * min(1.0, label.width / text_width(text, row.height))
+                    rows[number] = replace(row, text=text, height=height)
+            written = _Annotations(piece, label, rows, paper, borders=False, slits=slits)
+            strokes, words = strokes + written.strokes, written.words
         if edge:
-            # Each size stands on its own cut line, staggered along an edge so that the sizes do not collide.
-            ring = shapely.LinearRing(piece.cut_line)
-            joints = shapely.MultiLineString([] if paper is None else [joint.tolist() for joint in paper.joints])
-            # Twice on a long edge.
-            rows_of_tags = ((0.08, 0.3), (0.62, 0.3)) if piece.edge(edge).length > SHORT_EDGE else ((0.05, 0.9),)
-            for start, along in rows_of_tags:
-                at_first = start + along * (index + 0.5) / len(pieces)
-                tags = []
-                # A little to either side, more and more, where a joint of two sheets would cut it.
-                for away in (0.0, *(sign * step * 0.02 for step in range(1, 16) for sign in (1, -1))):
-                    at = resample(piece.edge(edge).line, min(max(at_first + away, 0.0), 1.0))
-                    on_cut = np.asarray(ring.interpolate(ring.project(shapely.Point(at))).coords[0])
-                    tags.append(Words(text=piece.size, at=on_cut, height=0.004, bold=True, tag=True))
-                    if shapely.disjoint(shapely.Polygon(tags[-1].box()), joints):
-                        break
-                else:
-                    tags = tags[:1]
-                words.append(tags[-1])
+            words += _size_tags(piece, edge, (index + 0.5) / len(pieces), joints)
         drawings.append(Drawing(piece=piece, strokes=tuple(strokes), words=tuple(words)))
     return tuple(drawings)
+
+
+def _widest_edge(pieces: Sequence[DraftedPiece]) -> str:
+    """Return the edge that all sizes have along which they lie farthest apart: there a size is easiest to read off its line."""
+
+    def shift_across(name: str) -> float:
+        first, last = (resample(piece.edge(name).line, 0.5) for piece in (pieces[0], pieces[-1]))
+        start, end = pieces[0].edge(name).line[[0, -1]]
+        x, y = unit(end - start)
+        return abs(float((last - first) @ [y, -x]))
+
+    names = [e.name for e in pieces[0].edges if e.kind not in ("fold", "dart")]
+    shared = [name for name in names if all(name in {e.name for e in piece.edges} for piece in pieces)]
+    return max(shared, key=lambda name: shift_across(name) * pieces[0].edge(name).length ** 0.5, default="")
+
+
+def _size_tags(piece: DraftedPiece, name: str, share: float, joints: Sequence[FloatArray]) -> list[Words]:
+    """Return the size of a piece on its own cut line beside an edge, twice if that is long; sizes are staggered by their share."""
+    import shapely
+
+    ring, sheets, tags = shapely.LinearRing(piece.cut_line), shapely.MultiLineString(list(joints)), list[Words]()
+    line = piece.edge(name).line
+    for start, along in ((0.08, 0.3), (0.62, 0.3)) if polyline_length(line) > SHORT_EDGE else ((0.05, 0.9),):
+        tried = []
+        # A little to either side, more and more, where a joint of two sheets would cut it.
+        for away in (0.0, *(sign * step * 0.02 for step in range(1, 16) for sign in (1, -1))):
+            at = resample(line, min(max(start + along * share + away, 0.0), 1.0))
+            on_cut = np.asarray(ring.interpolate(ring.project(shapely.Point(at))).coords[0])
+            tried.append(Words(text=piece.size, at=on_cut, height=0.004, bold=True, tag=True))
+            if shapely.disjoint(shapely.Polygon(tried[-1].box()), sheets):
+                break
+        else:
+            tried = tried[:1]
+        tags.append(tried[-1])
+    return tags
+
+
+def _strokes(piece: DraftedPiece, paper: OnPaper | None, *, nested: bool = False) -> list[Stroke]:
+    """Return the lines of a piece; of one in a nest the sewing lines are hidden."""
+    sewing = [_edge_stroke(piece, edge) for edge in piece.edges if paper is None or edge.kind != "fold"]
+    # Holes that have an allowance have a sewing line, too.
+    sewing += [
+        Stroke(role="sew", name=f"{name}.sew", points=cutout.sew_line, closed=True)
+        for name, cutout in piece.cutouts.items()
+        if cutout.width > 0
+    ]
+    if nested:
+        sewing = [replace(line, hidden=line.role not in ("dart", "fold")) for line in sewing]
+    return [*_cut_strokes(piece, open_folds=paper is not None), *sewing, *_detail_strokes(piece)]
 
 
 def _cut_strokes(piece: DraftedPiece, *, open_folds: bool) -> list[Stroke]:
@@ -192,7 +199,7 @@ def _cut_strokes(piece: DraftedPiece, *, open_folds: bool) -> list[Stroke]:
     on_fold = np.zeros(len(ring), dtype=bool)
     for edge in piece.fold_edges:
         start, end = edge.line[[0, -1]]
-        along = (end - start) / np.linalg.norm(end - start)
+        along = unit(end - start)
         away = [np.abs((points - start) @ [-along[1], along[0]]) for points in (ring, onwards)]
         on_fold |= np.maximum(*away) < ON_FOLD
     if not on_fold.any() or on_fold.all():
@@ -220,15 +227,6 @@ def _edge_stroke(piece: DraftedPiece, edge: DraftedEdge) -> Stroke:
     role = edge.kind if edge.kind in ("hem", "fold", "dart") else "sew"
     line = piece.drawn_line(edge)
     return Stroke(role=role, name=edge.name, points=line, curve=edge.curve if line is edge.line else None)
-
-
-def _cutout_sew_strokes(piece: DraftedPiece) -> list[Stroke]:
-    """Return the sewing lines of holes that have an allowance."""
-    return [
-        Stroke(role="sew", name=f"{name}.sew", points=cutout.sew_line, closed=True)
-        for name, cutout in piece.cutouts.items()
-        if cutout.width > 0
-    ]
 
 
 def _detail_strokes(piece: DraftedPiece) -> list[Stroke]:
@@ -262,137 +260,143 @@ def _detail_strokes(piece: DraftedPiece) -> list[Stroke]:
     return strokes
 
 
-def _annotations(
-    piece: DraftedPiece,
-    label: Label,
-    rows: Sequence[Words],
-    paper: OnPaper | None,
-    *,
-    borders: bool = True,
-    slits: Sequence[Geometry] = (),
-) -> tuple[list[Stroke], list[Words]]:
-    """Draw grain, internal lines, leader and brackets of folds, and place all words of a piece so that they keep clear of each other.
+class _Annotations:
+    """Grain, internal lines, leader and brackets of folds of a piece, and its words, which keep clear of each other.
 
     An edge's name stands inside the sewing line, a dart's beside its first leg, a seam's letter beside its notch, in the
     allowance. Nothing is written across a joint.
 
-    Args:
-        piece: whose words they are.
-        label: of the piece, or of its nest.
-        rows: what the label says, at its place.
-        paper: where it is printed; None writes no letters.
-        borders: whether edges have names.
-        slits: notches of other sizes, which letters keep off.
+    Attributes:
+        strokes, words: what is drawn and written.
     """
-    import shapely
 
-    strokes = [
-        *grain_strokes(piece.grain),
-        *(
-            Stroke(
-                role="left_out" if name.endswith(LEFT_OUT) else "internal",
-                name=name,
-                points=line,
-                curve=_fit_internal_line(line.tobytes()),
-            )
-            for name, line in piece.internal_lines.items()
-        ),
-    ]
-    words, room = list(rows), LabelRoom()
-    if label.leader is None:
-        room.take(shapely.Polygon(label.box))
-    else:
-        strokes.append(Stroke(role="leader", name="", points=label.leader))
-    for joint in () if paper is None else paper.joints:
-        room.take(shapely.LineString(joint))
-    if paper is not None and paper.outside is not None:
-        room.take(paper.outside)
-    for hole in piece.drill_holes:
-        room.take(shapely.Point(hole.at).buffer(2 * DRILL))
-    for cutout in piece.cutouts.values():
-        room.take(shapely.LinearRing(cutout.sew_line))
-    for stroke in grain_strokes(piece.grain):
-        room.take(shapely.LineString(stroke.points))
+    def __init__(
+        self,
+        piece: DraftedPiece,
+        label: Label,
+        rows: Sequence[Words],
+        paper: OnPaper | None,
+        *,
+        borders: bool = True,
+        slits: Sequence[Geometry] = (),
+    ) -> None:
+        """Draw and write.
 
-    def write(text: str, height: float, spots: Iterable[Spot], *, bold: bool = False, **clear: Any) -> bool:
+        Args:
+            piece: whose words they are.
+            label: of the piece, or of its nest.
+            rows: what the label says, at its place.
+            paper: where it is printed; None writes no letters.
+            borders: whether edges have names.
+            slits: notches of other sizes, which letters keep off.
+        """
+        import shapely
+
+        self._piece, self._paper, self._room = piece, paper, LabelRoom()
+        grain = grain_strokes(piece.grain)
+        self.words, self.strokes = list(rows), list(grain)
+        for name, line in piece.internal_lines.items():
+            role, curve = "left_out" if name.endswith(LEFT_OUT) else "internal", _fit_internal_line(line.tobytes())
+            self.strokes.append(Stroke(role=role, name=name, points=line, curve=curve))
+        if label.leader is None:
+            self._room.take(shapely.Polygon(label.box))
+        else:
+            self.strokes.append(Stroke(role="leader", name="", points=label.leader))
+        for joint in () if paper is None else paper.joints:
+            self._room.take(shapely.LineString(joint))
+        if paper is not None and paper.outside is not None:
+            self._room.take(paper.outside)
+        for hole in piece.drill_holes:
+            self._room.take(shapely.Point(hole.at).buffer(2 * DRILL))
+        for cutout in piece.cutouts.values():
+            self._room.take(shapely.LinearRing(cutout.sew_line))
+        for stroke in grain:
+            self._room.take(shapely.LineString(stroke.points))
+        beyond = [self._bracket(fold) for fold in piece.fold_edges]
+        named = self._named_lines(borders=borders)
+        drawn = [shapely.LineString(line) for _, line, _ in named]
+        self._name_lines(named, drawn)
+        self._name_buttons(drawn)
+        if paper is not None:
+            self._letter_notches(paper.letters, beyond, slits)
+
+    def _write(
+        self, text: str, height: float, places: Iterable[Spot] | FloatArray, *, bold: bool = False, **clear: Any
+    ) -> bool:
+        """Write a text at the clearest of some spots, or level at places (#P by 2 [m]); return whether there is room."""
+        spots = (Spot(x=x, y=y) for x, y in places.tolist()) if isinstance(places, np.ndarray) else places
         width = text_width(text, height, bold=bold)
-        spot = room.place_clear(spots, width, TAILS * height, **clear)
+        spot = self._room.place_clear(spots, width, TAILS * height, **clear)
         if spot is not None:
             at = np.array([spot.x, spot.y])
-            words.append(Words(text=text, at=at, height=height, angle=spot.angle, bold=bold))
+            self.words.append(Words(text=text, at=at, height=height, angle=spot.angle, bold=bold))
         return spot is not None
 
-    beyond = list[Any]()
-    for fold in piece.fold_edges:
-        # A line beside the fold whose two arms point to it, with words along it.
+    def _bracket(self, fold: DraftedEdge) -> Geometry:
+        """Draw a line beside a fold whose two arms point to it, with words along it; return what lies beyond the fold."""
+        import shapely
+
         start, span = fold.line[0], fold.line[-1] - fold.line[0]
         length = float(np.linalg.norm(span))
         inwards = np.array([-span[1], span[0]]) / length
         depth = min(BRACKET, length / 4)
         a, b = start + 0.15 * span, start + 0.85 * span
-        points = np.stack([a, a + depth * inwards, b + depth * inwards, b])
-        bracket = [
-            Stroke(role="grain", name="", points=points),
-            _arrow(a, -inwards, "grain"),
-            _arrow(b, -inwards, "grain"),
-        ]
-        strokes += bracket
+        line = Stroke(role="grain", name="", points=np.stack([a, a + depth * inwards, b + depth * inwards, b]))
+        bracket = [line, _arrow(a, -inwards), _arrow(b, -inwards)]
+        self.strokes += bracket
         angle = float(np.arctan2(span[1], span[0]))
         if angle > np.pi / 2 + 1e-6 or angle <= -np.pi / 2 + 1e-6:
             angle += np.pi
         places = [a + share * (b - a) + (depth / 2) * inwards for share in (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8)]
         inside = [Spot(x=float(x), y=float(y), angle=angle) for x, y in places]
-        write(translate("PLACE ON FOLD"), min(0.0035, length / 20), inside, enough=CLEAR)
+        self._write(translate("PLACE ON FOLD"), min(0.0035, length / 20), inside, enough=CLEAR)
         # Other words keep off the bracket, and inside the half that is printed.
         for stroke in bracket:
-            room.take(shapely.LineString(stroke.points))
-        if paper is not None:
-            run, out = BEYOND_FOLD * span / length, BEYOND_FOLD * inwards
-            ends = start - run, fold.line[-1] + run
-            beyond.append(shapely.Polygon([ends[0], ends[0] - out, ends[1] - out, ends[1]]))
-            room.take(beyond[-1])
+            self._room.take(shapely.LineString(stroke.points))
+        run = BEYOND_FOLD * span / length
+        beyond = parallelogram(start - run, span + 2 * run, (0.0, 1.0), inwards, (0.0, -BEYOND_FOLD))
+        if self._paper is not None:
+            self._room.take(beyond)
+        return beyond
 
-    # The lines that get a name: the name, its line, and whether it stands to the left of the line or above it.
-    first_legs = {dart.dart.left: dart.dart.name for dart in piece.darts}
-    second_legs = {dart.dart.right for dart in piece.darts}
-    named = [(name, line, "above") for name, line in piece.internal_lines.items()]
-    for edge in piece.edges:
-        if edge.name in first_legs:
-            named.append((first_legs[edge.name], piece.drawn_line(edge), "left"))
-        elif borders and edge.kind != "fold" and edge.name not in second_legs:
-            named.append((edge.name, edge.line, "left"))
-    named += [(name, fisheye_legs(line)[0][::-1], "left") for name, line in piece.fisheyes.items()]
-    called = {name for name, _, _ in named}
-    hems = {
-        edge.name
-        for edge in piece.edges
-        if edge.kind == "hem" or (edge.kind == "cut" and HEMMED_LEVELS & set(edge.name.split(" ")))
-    }
-    drawn = [shapely.LineString(line) for _, line, _ in named]
-    for index, (name, line, side) in enumerate(named):
-        # A lower edge is a hem for a sewer, turned up or raw, whatever level of the body it lies at; vents and wraps keep theirs.
-        kind = (
-            "hem"
-            if name in hems and not {"vent", "slit", "wrap"} & set(name.split(" "))
-            else name_without_number(name, called)
-        )
-        # One of a pair is neither left nor right, as in the sewing order.
-        text = translate_name(without_side(kind) if piece.piece.is_pair else kind)
-        text = name_in_units(text, piece.piece.units)
-        width = text_width(text, NAME)
-        if polyline_length(line) >= width + (0.008 if side == "left" else 0.02):
+    def _named_lines(self, *, borders: bool) -> list[tuple[str, FloatArray, str]]:
+        """Return the lines that get a name: the name, its line, and whether it stands to the left of the line or above it."""
+        piece = self._piece
+        first_legs = {dart.dart.left: dart.dart.name for dart in piece.darts}
+        second_legs = {dart.dart.right for dart in piece.darts}
+        named = [(name, line, "above") for name, line in piece.internal_lines.items()]
+        for edge in piece.edges:
+            if edge.name in first_legs:
+                named.append((first_legs[edge.name], piece.drawn_line(edge), "left"))
+            elif borders and edge.kind != "fold" and edge.name not in second_legs:
+                named.append((edge.name, edge.line, "left"))
+        return named + [(name, fisheye_legs(line)[0][::-1], "left") for name, line in piece.fisheyes.items()]
+
+    def _name_lines(self, named: Sequence[tuple[str, FloatArray, str]], drawn: Sequence[Geometry]) -> None:
+        """Write the names of lines along them, each clear of the other lines."""
+        piece, called = self._piece.piece, {name for name, _, _ in named}
+        for index, (name, line, side) in enumerate(named):
+            # A lower edge is a hem for a sewer, turned up or raw, whatever level of the body it lies at; vents and wraps keep theirs.
+            words, kinds = set(name.split(" ")), [edge.kind for edge in self._piece.edges if edge.name == name]
+            lower = "hem" in kinds or ("cut" in kinds and HEMMED_LEVELS & words)
+            kind = "hem" if lower and not {"vent", "slit", "wrap"} & words else name_without_number(name, called)
+            # One of a pair is neither left nor right, as in the sewing order.
+            text = name_in_units(translate_name(without_side(kind) if piece.is_pair else kind), piece.units)
+            width = text_width(text, NAME)
+            if polyline_length(line) < width + (0.008 if side == "left" else 0.02):
+                continue
             others = [*drawn[:index], *drawn[index + 1 :]]
             # Beside an edge, as a zip is, a name may have room on one side alone.
             for which in (side, "either") if side == "above" else (side,):
                 spots = spots_along(line, width, NAME_GAP, shares=NAME_SHARES, side=which)
-                if write(text, NAME, spots, avoid=others, least=CLEAR, enough=WELL_CLEAR):
+                if self._write(text, NAME, spots, avoid=others, least=CLEAR, enough=WELL_CLEAR):
                     break
-    # The first button and the first buttonhole of a row, which are too short for a name along them.
-    marks = {hole.name: hole.at for hole in piece.drill_holes if hole.name == "button"}
-    marks |= {name: line.mean(axis=0) for name, line in piece.internal_lines.items() if name == "buttonhole"}
-    for name, at in marks.items():
-        text = translate_name(name)
-        out = np.array([text_width(text, NAME) / 2 + 2 * DRILL + 0.001, 2 * DRILL + NAME])
+
+    def _name_buttons(self, drawn: Sequence[Geometry]) -> None:
+        """Name the first button and the first buttonhole of a row, which are too short for a name along them."""
+        marks = {hole.name: hole.at for hole in self._piece.drill_holes if hole.name == "button"}
+        lines = self._piece.internal_lines
+        marks |= {name: line.mean(axis=0) for name, line in lines.items() if name == "buttonhole"}
         sides = [
             (0, 1),
             (0, -1),
@@ -407,29 +411,33 @@ def _annotations(
             (1.6, 0),
             (-1.6, 0),
         ]
-        around = [Spot(x=float(x), y=float(y)) for x, y in at + out * sides]
-        write(text, NAME, around, avoid=drawn, least=CLEAR, enough=LETTER_CLEAR)
-    letters = {} if paper is None else paper.letters
-    for notch in piece.notches:
-        letter = letters.get(notch.seam)
-        if letter is not None:
+        for name, at in marks.items():
+            text = translate_name(name)
+            out = np.array([text_width(text, NAME) / 2 + 2 * DRILL + 0.001, 2 * DRILL + NAME])
+            self._write(text, NAME, at + out * sides, avoid=drawn, least=CLEAR, enough=LETTER_CLEAR)
+
+    def _letter_notches(
+        self, letters: Mapping[str, str], beyond: Sequence[Geometry], slits: Sequence[Geometry]
+    ) -> None:
+        """Write each seam's letter beside its notches, outside the outer slit of a double one, and not beyond a fold."""
+        import shapely
+
+        for notch in (notch for notch in self._piece.notches if notch.seam in letters):
+            letter = letters[notch.seam]
             along = np.array([notch.direction[1], -notch.direction[0]])
             middle = (notch.depth / 2 + 0.0004) * notch.direction
-            # Beside the outer slit of a double notch.
-            aside = [max(float((base - notch.base[0]) @ along * sign) for base in notch.base) for sign in (1.0, -1.0)]
             half = text_width(letter, LETTER, bold=True) / 2 + LETTER_GAP
             # Close to the notch, or where the sheet ends there, some way along the edge.
-            places = [
-                notch.base[0] + middle + sign * (out + half + way) * along
-                for way in (0.0, LETTER, 2.0 * LETTER)
-                for sign, out in zip((1.0, -1.0), aside, strict=True)
-            ]
+            places = []
+            for way in (0.0, LETTER, 2.0 * LETTER):
+                for sign in (1.0, -1.0):
+                    out = max(float((base - notch.base[0]) @ along * sign) for base in notch.base)
+                    places.append(notch.base[0] + middle + sign * (out + half + way) * along)
             # Where the sheets' joint runs through all of them, the fold still counts.
-            off = [min(shapely.distance(shapely.Point(place), beyond), default=np.inf) for place in places]
-            places = [place for place, away in zip(places, off, strict=True) if away > half - LETTER_GAP] or places
-            beside = [Spot(x=float(x), y=float(y)) for x, y in places]
-            write(letter, LETTER, beside, bold=True, avoid=slits, enough=LETTER_CLEAR)
-    return strokes, words
+            away = [min(shapely.distance(shapely.Point(place), beyond), default=np.inf) for place in places]
+            clear = np.array(away) > half - LETTER_GAP
+            spots = np.array(places)[clear if clear.any() else slice(None)]
+            self._write(letter, LETTER, spots, bold=True, avoid=slits, enough=LETTER_CLEAR)
 
 
 @lru_cache(maxsize=1024)
@@ -441,13 +449,11 @@ def _fit_internal_line(line: bytes) -> Curve:
 def grain_strokes(grain: FloatArray) -> list[Stroke]:
     """Draw the grain line (2 by 2 [m]) with an arrow at either end."""
     low, high = grain
-    strokes = [Stroke(role="grain", name="grain", points=grain)]
-    strokes += [_arrow(high, high - low, "grain"), _arrow(low, low - high, "grain")]
-    return strokes
+    return [Stroke(role="grain", name="grain", points=grain), _arrow(high, high - low), _arrow(low, low - high)]
 
 
-def _arrow(tip: FloatArray, direction: FloatArray, role: str) -> Stroke:
-    along = direction / max(float(np.linalg.norm(direction)), 1e-12)
+def _arrow(tip: FloatArray, direction: FloatArray) -> Stroke:
+    along = unit(direction)
     across = np.array([-along[1], along[0]])
     points = np.stack([tip - ARROW * along + BARB * across, tip, tip - ARROW * along - BARB * across])
-    return Stroke(role=role, name="", points=points)
+    return Stroke(role="grain", name="", points=points)

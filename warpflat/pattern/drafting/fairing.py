@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_banded
 
-from warpflat.core import BoolArray, FloatArray, arc_lengths, points_at_lengths
+from warpflat.core import BoolArray, FloatArray, arc_lengths, points_at_lengths, unit
+from warpflat.pattern.drafting.curves import farthest
 
 __all__ = ["FairLine", "bend_one_way", "count_inflections", "fair_line", "fairest_line"]
 
@@ -48,9 +49,14 @@ def count_inflections(points: FloatArray) -> int:
 
     A line and its mirror image have as many: it is counted from both ends, and the lower count is taken.
     """
-    steps = np.diff(_evenly(points)[1], axis=0)
-    angles = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])).tolist()
+    angles = _directions(_evenly(points)[1]).tolist()
     return min(_changes_of_bend(angles), _changes_of_bend(angles[::-1]))
+
+
+def _directions(points: FloatArray) -> FloatArray:
+    """Return the direction of each step of a line (#P by 2), #P - 1 [rad], without jumps by whole turns."""
+    steps = np.diff(points, axis=0)
+    return np.asarray(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])))
 
 
 def _changes_of_bend(angles: list[float]) -> int:
@@ -97,7 +103,6 @@ def _fair_lines(
 ) -> Iterator[FairLine]:
     """Yield the line of :func:`fair_line` for each wave [m]; the waves share the equations."""
     places, even = _evenly(points)
-    arc = arc_lengths(points)
     is_straight, weight = _straight_places(points, places, straight), _weights(points, places, met)
     first = 0
     for at_end in (False, True):
@@ -129,10 +134,7 @@ def _fair_lines(
     for wave in waves:
         stiffness = (wave / (2 * np.pi * places[1])) ** 6
         solved = solve_banded((width, width), banded[0] + stiffness * banded[1], wanted)
-        smooth = (basis @ solved)[first : first + len(places)]
-        # Points keep their shares of the length.
-        placed = points_at_lengths(smooth, np.interp(arc, places, arc_lengths(smooth)))
-        yield _fair(placed, points, smooth)
+        yield _fair(points, places, (basis @ solved)[first : first + len(places)])
 
 
 def bend_one_way(
@@ -154,7 +156,7 @@ def bend_one_way(
 
     places, even = _evenly(points)
     chord = even[-1] - even[0]
-    along = chord / max(float(np.linalg.norm(chord)), 1e-12)
+    along = unit(chord)
     across = np.array([-along[1], along[0]])
     x, y = (even - even[0]) @ along, (even - even[0]) @ across
     if np.diff(x).min() <= 0.0:
@@ -169,8 +171,7 @@ def bend_one_way(
     rows, wanted = np.vstack([root[:, None] * basis, bend]), np.concatenate([root * side * y, np.zeros(len(bend))])
     shares, _ = nnls(rows, wanted, maxiter=100 * len(x))
     smooth = even[0] + x[:, None] * along + side * (basis @ shares)[:, None] * across
-    placed = points_at_lengths(smooth, np.interp(arc_lengths(points), places, arc_lengths(smooth)))
-    return _fair(placed, points, smooth)
+    return _fair(points, places, smooth)
 
 
 def fairest_line(
@@ -231,12 +232,12 @@ def _end_turn(first: FloatArray, second: FloatArray) -> float:
     return float(np.abs((turned + np.pi) % (2.0 * np.pi) - np.pi).max())
 
 
-def _fair(placed: FloatArray, points: FloatArray, smooth: FloatArray) -> FairLine:
-    """Return a faired line (#S by 2 [m]) of some points, which come to lie at `placed`, with its measures."""
-    places, even = _evenly(smooth)
-    steps = np.diff(even, axis=0)
-    angles = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-    apart = min(max(1, round(WITHIN / places[1])), len(angles) - 1)
+def _fair(points: FloatArray, places: FloatArray, smooth: FloatArray) -> FairLine:
+    """Return a faired line (#S by 2 [m]) of some points, with its measures; the points keep their places along the line [m] (#S)."""
+    placed = points_at_lengths(smooth, np.interp(arc_lengths(points), places, arc_lengths(smooth)))
+    evenly, even = _evenly(smooth)
+    angles = _directions(even)
+    apart = min(max(1, round(WITHIN / evenly[1])), len(angles) - 1)
     turn = float(np.abs(angles[apart:] - angles[:-apart]).max())
     return FairLine(points=placed, shift=_distance(points, smooth), inflections=count_inflections(smooth), turn=turn)
 
@@ -266,10 +267,5 @@ def _evenly(points: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _distance(points: FloatArray, line: FloatArray) -> float:
     """Return the largest distance of a point from a line that goes on straight beyond its ends [m]."""
-    import shapely
-
-    reach = 0.02
-    ends = [line[0] - line[1], line[-1] - line[-2]]
-    away = [reach * end / max(float(np.linalg.norm(end)), 1e-12) for end in ends]
-    longer = np.vstack([line[0] + away[0], line, line[-1] + away[1]])
-    return float(shapely.distance(shapely.LineString(longer), shapely.points(points)).max())
+    away = 0.02 * unit(np.stack([line[0] - line[1], line[-1] - line[-2]]))
+    return farthest(np.vstack([line[0] + away[0], line, line[-1] + away[1]]), points)

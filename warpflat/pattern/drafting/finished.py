@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from warpflat.core import FloatArray, line_name, polyline_length, without_side
+from warpflat.core import FloatArray, line_name, polyline_length, unit, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.sewing_tasks import is_flounce
 from warpflat.pattern.drafting.words import translate, translate_name
@@ -109,7 +109,7 @@ def _laps(piece: DraftedPiece, hem: FloatArray) -> float:
     centre = [line for name, line in piece.internal_lines.items() if line_name(name) == "centre front"]
     if len(centre) != 1 or not piece.piece.is_pair:
         return 0.0
-    way = (centre[0][-1] - centre[0][0]) / np.linalg.norm(centre[0][-1] - centre[0][0])
+    way = unit(centre[0][-1] - centre[0][0])
     parts = shapely.ops.split(shapely.LineString(hem), shapely.LineString([centre[0][0] - way, centre[0][-1] + way]))
     # The narrower part lies beyond it.
     return float(min(part.length for part in parts.geoms)) if len(parts.geoms) == 2 else 0.0

@@ -12,8 +12,13 @@ import numpy as np
 from warpflat.core import FloatArray, arc_lengths, polyline_length, segment_lengths, turning_angles
 from warpflat.pattern.drafting.curves import TOLERANCE, Curve, chords, farthest, fit_curve
 from warpflat.pattern.drafting.piece_parts import SAME_POINT
-from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
-from warpflat.pattern.drafting.seam_difference import LOCAL_TOLERANCE, SEAM_TOLERANCE, worst_difference
+from warpflat.pattern.drafting.pieces import Piece, Seam
+from warpflat.pattern.drafting.seam_difference import (
+    LOCAL_TOLERANCE,
+    SEAM_TOLERANCE,
+    lengths_along_side,
+    worst_difference,
+)
 
 if TYPE_CHECKING:
     from shapely import LineString
@@ -32,9 +37,6 @@ __all__ = [
 
 #: Names of a piece and of its edge.
 EdgeKey = tuple[str, str]
-Sides = tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]]
-#: By how much a seam's second side is longer, as a share, and the shares of the first between which it is.
-Eased = tuple[float, tuple[float, float]]
 
 #: How far [m] curves may lie from a border: the first is for clean meshes, the others are tried on ragged ones.
 TOLERANCES = (TOLERANCE, 3e-4, 1e-3, 2e-3)
@@ -47,8 +49,6 @@ SWING, SWING_PER_METRE = 0.3, 3.5
 WAVE = 0.04
 #: Inside a piece, waves of these numbers of mesh edges are smoothed away, the short ones first, until a line is clean.
 WAVES = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
-#: Smoothed sides of a ragged seam agree in length within this [m], if a tolerance can be found for it.
-EQUAL = 1e-4
 #: Curves keep near their points where the sides of their seams then differ by at most this share of what is allowed.
 SAFE = 0.8
 # Sides that differ by more than allowed in the layout are drawn with at most so many times that.
@@ -79,10 +79,10 @@ def fit_edges(
     Args:
         pieces: of one size.
         lines: #P by 2 [m], the points of every edge, in its piece's direction.
-        seams: between them; the legs of the pieces' darts count as seams too.
+        seams: between them; the legs of the pieces' darts are sewn too.
         tolerance: [m] for all edges; None takes the least of `TOLERANCES` that makes a clean curve of each.
     """
-    fitted = {}
+    fitted, sewn = {}, [*seams, *(dart for piece in pieces for dart in piece.dart_seams)]
     for piece in pieces:
         for edge in piece.edges:
             line = lines[piece.name, edge.name]
@@ -92,7 +92,7 @@ def fit_edges(
     if tolerance is None:
         # Edges that are sewn to one other edge, whether they run against each other, and the second's ease.
         pairs = list[tuple[EdgeKey, EdgeKey, bool, float]]()
-        for seam in seams:
+        for seam in sewn:
             (one, *more), (other, *others) = seam.sides
             ends = one.place, other.place
             if not more and not others and ends[0] != ends[1]:
@@ -101,9 +101,8 @@ def fit_edges(
             for key in {side.place for side in seam.stretches}:
                 # Of several edges each keeps its own length as it is smoothed: so do both sides.
                 width, arc = fitted[key][1], arc_lengths(lines[key])
-                if width > TOLERANCE and abs(fitted[key][0].length - arc[-1]) > EQUAL:
+                if width > TOLERANCE and abs(fitted[key][0].length - arc[-1]) > TOLERANCE:
                     fitted[key] = fit_curve(lines[key], width, lengths=arc), width
-        pairs += [((p.name, dart.left), (p.name, dart.right), True, 0.0) for p in pieces for dart in p.darts]
         for first, second, against, ease in pairs:
             wide = max(fitted[first][1], fitted[second][1])
             if wide > TOLERANCE and len(lines[first]) == len(lines[second]):
@@ -125,10 +124,10 @@ def fit_edges(
                     difference = abs(curves[1].length - curves[0].length * longer[1])
                     if difference <= SAFE * LOCAL_TOLERANCE:
                         found, used = curves, width
-                    if difference <= EQUAL and not any(map(_ragged, curves)):
+                    if difference <= TOLERANCE and not any(map(_ragged, curves)):
                         break
                 fitted[first], fitted[second] = (found[0], used), (found[1].reversed() if against else found[1], used)
-    _keep_near(pieces, lines, seams, fitted, tolerance)
+    _keep_near(pieces, lines, sewn, fitted, tolerance)
     clean = uncrossed(pieces, lines, {key: curve for key, (curve, _) in fitted.items()})
     return {key: (clean[key], width) for key, (_, width) in fitted.items()}
 
@@ -288,9 +287,8 @@ def as_in_layout(
     unchecked = list(seams)
 
     def strays(seam: Seam) -> bool:
-        drawn, chord = (_both((seam.sides, (seam.ease, seam.eased)), lines, each) for each in (found, flat))
-        laid = chord[:2] if seam.as_laid else None
-        now, least = (_differences(*each, laid) for each in (drawn, chord))
+        laid = _along_sides(seam, lines, flat) if seam.as_laid else None
+        now, least = (_differences(seam, lines, each, laid) for each in (found, flat))
         return any(one > max(1.0, _NO_WORSE * other) for one, other in zip(now, least, strict=True))
 
     # Chords on one side of a seam may change an edge of another one.
@@ -344,7 +342,6 @@ def smooth_line(line: FloatArray) -> FloatArray:
     Args:
         line: #P by 2 [m].
     """
-    import shapely
     from scipy.interpolate import make_smoothing_spline
 
     arc = arc_lengths(line)
@@ -358,7 +355,7 @@ def smooth_line(line: FloatArray) -> FloatArray:
         stiffness = (wave * edge / (2 * np.pi)) ** 4 * len(line) / arc[-1]
         tried = make_smoothing_spline(arc, line, w=weights, lam=stiffness)(places)
         tried[[0, -1]] = line[[0, -1]]
-        if shapely.distance(shapely.LineString(tried), shapely.points(line)).max() > edge:
+        if farthest(tried, line) > edge:
             break
         smooth = tried
         if not is_wavy(chords(smooth)):
@@ -398,53 +395,39 @@ def _keep_near(
     clean = [key for key in keys if fitted[key][1] <= within]
     far = [key for key in clean if fitted[key][1] != within or farthest(fitted[key][0].sample(), lines[key]) > within]
     tried = fitted | {key: (fit_curve(lines[key], within, near=True), within) for key in far}
-    # Both sides of every seam and dart, in one direction, and the second side's ease.
-    unchecked: list[tuple[Sides, Eased]] = [(seam.sides, (seam.ease, seam.eased)) for seam in seams]
-    for name, dart in ((piece.name, dart) for piece in pieces for dart in piece.darts):
-        left, right = SeamSide(piece=name, edge=dart.left), SeamSide(piece=name, edge=dart.right, reversed=True)
-        unchecked.append((((left,), (right,)), (0.0, (0.0, 1.0))))
+    unchecked = list(seams)
     # The edges of a mirror pair are sewn at two seams: a curve that one of them rejects changes the other.
-    while unequal := [seam for seam in unchecked if _difference(*_both(seam, lines, tried)) > SAFE]:
-        for sides, ease in unequal:
-            near, before = (_difference(*_both((sides, ease), lines, curves)) for curves in (tried, fitted))
+    while unequal := [seam for seam in unchecked if max(_differences(seam, lines, tried)) > SAFE]:
+        for seam in unequal:
+            near, before = (max(_differences(seam, lines, curves)) for curves in (tried, fitted))
             # On a coarse mesh neither may be as close as it should be.
             if before <= max(near, 1.0):
-                tried |= {key: fitted[key] for row in sides for key in (side.place for side in row)}
+                tried |= {side.place: fitted[side.place] for side in seam.stretches}
         unchecked = [seam for seam in unchecked if seam not in unequal]
     fitted |= tried
 
 
-def _both(
-    seam: tuple[Sides, Eased], lines: Mapping[EdgeKey, FloatArray], curves: Mapping[EdgeKey, tuple[Curve, float]]
-) -> tuple[FloatArray, FloatArray, Eased]:
-    """Return the lengths along both sides of a seam at their points, and the second side's ease."""
-    (first, second), ease = seam
-    return _lengths_at_points(first, lines, curves), _lengths_at_points(second, lines, curves), ease
-
-
-def _lengths_at_points(
-    side: Sequence[SeamSide], lines: Mapping[EdgeKey, FloatArray], curves: Mapping[EdgeKey, tuple[Curve, float]]
-) -> FloatArray:
-    """Return the length [m] along one side of a seam at each of its points, joints once."""
-    rows = [np.zeros(1)]
-    for part in side:
-        key = part.piece, part.edge
-        reached = _lengths_along(curves[key][0], lines[key])
-        rows.append(rows[-1][-1] + (reached[-1] - reached[::-1] if part.reversed else reached)[1:])
-    return np.concatenate(rows)
-
-
-def _difference(first: FloatArray, second: FloatArray, ease: Eased) -> float:
-    """Return by how much the sides of a seam differ, over what is allowed."""
-    return max(_differences(first, second, ease))
+def _along_sides(
+    seam: Seam, lines: Mapping[EdgeKey, FloatArray], curves: Mapping[EdgeKey, tuple[Curve, float]]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the lengths along both sides of a seam at their points [m], joints once."""
+    first, second = (
+        lengths_along_side((_lengths_along(curves[part.place][0], lines[part.place]), part.reversed) for part in side)
+        for side in seam.sides
+    )
+    return first, second
 
 
 def _differences(
-    first: FloatArray, second: FloatArray, ease: Eased, laid: tuple[FloatArray, FloatArray] | None = None
+    seam: Seam,
+    lines: Mapping[EdgeKey, FloatArray],
+    curves: Mapping[EdgeKey, tuple[Curve, float]],
+    laid: tuple[FloatArray, FloatArray] | None = None,
 ) -> tuple[float, float]:
     """Return by how much the sides of a seam differ as a whole, and over a short stretch, each over what is allowed."""
-    near = worst_difference(first, second, *ease, laid=laid)
-    whole = abs(second[-1] - first[-1] * (1 + ease[0])) / SEAM_TOLERANCE
+    first, second = _along_sides(seam, lines, curves)
+    near = worst_difference(first, second, seam.ease, seam.eased, laid=laid)
+    whole = abs(second[-1] - first[-1] * (1 + seam.ease)) / SEAM_TOLERANCE
     return float(whole), 0.0 if near is None else near / LOCAL_TOLERANCE
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Set
+from collections.abc import Collection, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 from warpflat.core import FloatArray, InputError, IntArray, nearest, optional_step
 from warpflat.flat import MEET, border_loops, parted
 from warpflat.pattern.drafting.corners import find_corners, find_cracks
-from warpflat.pattern.drafting.piece_parts import LEFT_OUT, Dart, Edge, Hole
+from warpflat.pattern.drafting.piece_parts import LEFT_OUT, SAME_POINT, Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import Piece, check_hole
 from warpflat.pattern.drafting.placement import default_grain
+from warpflat.pattern.drafting.polygons import signed_area, upright
 
 __all__ = ["MeshFeatures", "inner_stretches", "line_labels", "piece_from_mesh"]
 
@@ -78,17 +79,15 @@ def piece_from_mesh(
         InputError: unknown names, a mesh without a border, dart vertices that are not on it, a border that crosses
             itself, or a crack around which the cloth lies on itself.
     """
-    features = features or MeshFeatures()
+    features, where = features or MeshFeatures(), f"piece {name!r}"
     flat = np.asarray(positions, dtype=np.float64)
     if flat.ndim != 2 or flat.shape[1] != 2 or not np.isfinite(flat).all():
-        raise InputError(f"piece {name!r}: positions have shape {flat.shape}; they must be #V by 2, finite, in metres")
+        raise InputError(f"{where}: positions have shape {flat.shape}; they must be #V by 2, finite, in metres")
     lines = {key: np.asarray(value, dtype=np.int32) for key, value in features.lines.items()}
     loops = border_loops(faces, np.column_stack([flat, np.zeros(len(flat))]))
     if not loops:
-        raise InputError(f"piece {name!r}: the mesh is closed and has no border; cut it open first")
-    # Areas [m2], negative where a border runs clockwise.
-    plane = flat[:, 0] + 1j * flat[:, 1]
-    areas = [float((plane[loop].conj() * plane[np.roll(loop, -1)]).imag.sum() / 2) for loop in loops]
+        raise InputError(f"{where}: the mesh is closed and has no border; cut it open first")
+    areas = [signed_area(flat[loop]) for loop in loops]
     largest = int(np.argmax(np.abs(areas)))
     if areas[largest] < 0:  # it lies on its back
         flat = flat * [-1.0, 1.0]
@@ -96,85 +95,32 @@ def piece_from_mesh(
     # A hole that meets the border at a point opens there.
     flat = flat.copy()
     flat[outer] = parted(flat[outer])
-    labels = line_labels(outer, lines)
-    corners = find_corners(flat[outer])
-    # The places in the loop of each dart's left mouth, tip and right mouth; cracks that are found are darts, too.
-    where = {vertex: place for place, vertex in enumerate(outer.tolist())}
-    darts = {}
-    for key, dart in features.darts.items():
-        for vertex in dart:
-            if vertex not in where:
-                raise InputError(f"piece {name!r}: dart {key!r}: vertex {vertex} is not on the outer border")
-        left, tip, right = (where[vertex] for vertex in dart)
-        if (tip - left) % len(outer) >= (right - left) % len(outer):
-            raise InputError(
-                f"piece {name!r}: dart {key!r}: give its vertices counter-clockwise: left mouth, tip, right mouth"
-            )
-        darts[key] = (left, tip, right)
-    corners = corners | {place for places in darts.values() for place in places}
-    found = find_cracks(flat[outer], corners, {places[1] for places in darts.values()})
-    if features.worn is not None:
-        mouths = features.worn[outer[[[left, right] for left, _, right in found]]] if found else np.empty((0, 2, 3))
-        gap = np.linalg.norm(mouths[:, 1] - mouths[:, 0], axis=1)
-        found = [places for places, wide in zip(found, gap.tolist(), strict=True) if wide <= MEET]
-    darts |= {(f"dart_{i + 1}" if len(found) > 1 else "dart"): places for i, places in enumerate(found)}
-    grain = None
-    if (datum := features.grain_line) is not None:
-        if datum not in lines:
-            raise InputError(f"piece {name!r}: no line {datum!r} for the grain; {nearest(datum, lines)}")
-        span = flat[lines[datum][-1]] - flat[lines[datum][0]]
-        if (length := float(np.linalg.norm(span))) < 1e-6:
-            raise InputError(f"piece {name!r}: line {datum!r} is closed and gives the grain no direction")
-        # Parallel to the line's chord but inside the piece: a datum line is often its border.
-        x, y = span / length
-        turn = np.array([[y, -x], [x, y]])
-        grain = default_grain(flat[outer] @ turn.T) @ turn
-    changes = {i for i in range(len(labels)) if labels[i] != labels[i - 1]}
-    changes |= {where[vertex] for vertex in features.ends if vertex in where}
-    # Places strictly between the two mouths of a dart.
-    inside_leg = {
-        (left + k) % len(labels) for left, _, right in darts.values() for k in range(1, (right - left) % len(labels))
-    }
-    # The border as edges from one split to the next, named by lines, darts or numbers.
-    splits = sorted((corners | changes) - inside_leg | {places[1] for places in darts.values()}) or [0]
-    legs = {places[0]: f"{key}.left" for key, places in darts.items()}
-    legs |= {places[1]: f"{key}.right" for key, places in darts.items()}
-    count, used, plain = len(outer), dict[str, int](), 0
-    stretches: list[tuple[str, IntArray]] = []
-    for start, end in zip(splits, [*splits[1:], splits[0] + count], strict=True):
-        vertices = outer[np.arange(start, end + 1) % count]
-        title = legs.get(start, labels[start])
-        if not title:
-            plain += 1
-            title = f"edge_{plain}"
-        used[title] = used.get(title, 0) + 1
-        stretches.append((title if used[title] == 1 else f"{title}_{used[title]}", vertices))
+    corners, darts = _find_darts(flat, outer, features, where)
+    stretches = _split_border(outer, line_labels(outer, lines), corners, darts, features.ends)
     names = [title for title, _ in stretches]
     for what, mapping in (("kinds", features.kinds), ("allowances", features.allowances)):
         for key in mapping:
             if key not in names:
-                raise InputError(f"piece {name!r}: {what} name an edge {key!r} that it has not; {nearest(key, names)}")
-    # Stretches of feature lines inside, and borders inside, counter-clockwise: those of cracks by their names.
+                raise InputError(f"{where}: {what} name an edge {key!r} that it has not; {nearest(key, names)}")
+    legs = {f"{key}.{side}" for key in darts for side in ("left", "right")}
     border = {
         (min(a, b), max(a, b)) for loop in loops for a, b in zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
     }
-    internal: dict[str, FloatArray] = {}
-    for key, line in lines.items():
-        for index, stretch in enumerate(inner_stretches(line, border)):
-            internal[key if index == 0 else f"{key}_{index + 1}"] = flat[stretch]
-    cracks = {key: np.unique(np.asarray(vertices)) for key, vertices in features.fisheyes.items()}
-    holes = []
-    for number, loop in enumerate(inner, start=1):
-        crack = next((each for each, ids in cracks.items() if np.array_equal(ids, np.sort(loop))), None)
-        label, kind = (f"hole_{number}", "cutout") if crack is None else (crack, "dart")
-        hole = Hole(name=label, points=flat[loop[::-1]], kind=kind)
-        if kind == "cutout":
-            with optional_step(f"{label} of {name} is not cut, and drawn dashed") as left_out:
-                check_hole(f"piece {name!r}", hole)
-            if left_out:
-                internal[label + LEFT_OUT] = flat[np.append(loop, loop[0])]
-                continue
-        holes.append(hole)
+    internal = {
+        key if index == 0 else f"{key}_{index + 1}": flat[stretch]
+        for key, line in lines.items()
+        for index, stretch in enumerate(inner_stretches(line, border))
+    }
+    holes, left_out = _holes(flat, inner, features.fisheyes, name)
+    grain = None
+    if (datum := features.grain_line) is not None:
+        if datum not in lines:
+            raise InputError(f"{where}: no line {datum!r} for the grain; {nearest(datum, lines)}")
+        span = flat[lines[datum][-1]] - flat[lines[datum][0]]
+        if float(np.linalg.norm(span)) < SAME_POINT:
+            raise InputError(f"{where}: line {datum!r} is closed and gives the grain no direction")
+        # Parallel to the line's chord but inside the piece: a datum line is often its border.
+        grain = default_grain(flat[outer] @ upright(span).T) @ upright(span)
     return Piece(
         name=name,
         size=size,
@@ -183,17 +129,89 @@ def piece_from_mesh(
             Edge(
                 name=title,
                 points=flat[vertices],
-                kind="dart" if title in legs.values() else features.kinds.get(title, "seam"),
+                kind="dart" if title in legs else features.kinds.get(title, "seam"),
                 allowance=features.allowances.get(title),
                 vertices=vertices,
             )
             for title, vertices in stretches
         ],
         darts=[Dart(name=key, left=f"{key}.left", right=f"{key}.right") for key in darts],
-        internal_lines=internal,
+        internal_lines=internal | left_out,
         grain=grain,
         holes=holes,
     )
+
+
+def _find_darts(
+    flat: FloatArray, outer: IntArray, features: MeshFeatures, where: str
+) -> tuple[set[int], dict[str, DartPlaces]]:
+    """Return the places of corners in the border, and those of darts: of the given ones, and of cracks, which are darts, too."""
+    place = {vertex: k for k, vertex in enumerate(outer.tolist())}
+    darts: dict[str, DartPlaces] = {}
+    for key, dart in features.darts.items():
+        for vertex in dart:
+            if vertex not in place:
+                raise InputError(f"{where}: dart {key!r}: vertex {vertex} is not on the outer border")
+        left, tip, right = (place[vertex] for vertex in dart)
+        if (tip - left) % len(outer) >= (right - left) % len(outer):
+            raise InputError(
+                f"{where}: dart {key!r}: give its vertices counter-clockwise: left mouth, tip, right mouth"
+            )
+        darts[key] = left, tip, right
+    corners = find_corners(flat[outer]) | {place for places in darts.values() for place in places}
+    found = find_cracks(flat[outer], corners, {tip for _, tip, _ in darts.values()})
+    if (worn := features.worn) is not None:
+        found = [each for each in found if np.linalg.norm(worn[outer[each[2]]] - worn[outer[each[0]]]) <= MEET]
+    return corners, darts | {(f"dart_{i + 1}" if len(found) > 1 else "dart"): each for i, each in enumerate(found)}
+
+
+def _split_border(
+    outer: IntArray,
+    labels: Sequence[str],
+    corners: set[int],
+    darts: Mapping[str, DartPlaces],
+    ends: Collection[int],
+) -> list[tuple[str, IntArray]]:
+    """Return the border as edges from one split to the next: the vertices of each, named by lines, darts or numbers."""
+    count = len(outer)
+    splits = corners | {k for k in range(count) if labels[k] != labels[k - 1]}
+    splits |= set(np.flatnonzero(np.isin(outer, list(ends))).tolist())
+    # Strictly between the two mouths of a dart there is its tip alone.
+    splits -= {(left + k) % count for left, _, right in darts.values() for k in range(1, (right - left) % count)}
+    splits |= {tip for _, tip, _ in darts.values()}
+    legs = {left: f"{key}.left" for key, (left, _, _) in darts.items()}
+    legs |= {tip: f"{key}.right" for key, (_, tip, _) in darts.items()}
+    ordered, used, plain = sorted(splits) or [0], dict[str, int](), 0
+    stretches = []
+    for start, end in zip(ordered, [*ordered[1:], ordered[0] + count], strict=True):
+        title = legs.get(start, labels[start])
+        if not title:
+            plain += 1
+            title = f"edge_{plain}"
+        used[title] = used.get(title, 0) + 1
+        name = title if used[title] == 1 else f"{title}_{used[title]}"
+        stretches.append((name, outer[np.arange(start, end + 1) % count]))
+    return stretches
+
+
+def _holes(
+    flat: FloatArray, loops: Sequence[IntArray], fisheyes: Mapping[str, ArrayLike], piece: str
+) -> tuple[list[Hole], dict[str, FloatArray]]:
+    """Return the holes inside a piece, those of cracks by their names, and the borders of those that cannot be cut."""
+    cracks = {key: np.unique(np.asarray(vertices)) for key, vertices in fisheyes.items()}
+    holes, borders = [], {}
+    for number, loop in enumerate(loops, start=1):
+        crack = next((each for each, ids in cracks.items() if np.array_equal(ids, np.sort(loop))), None)
+        label, kind = (f"hole_{number}", "cutout") if crack is None else (crack, "dart")
+        hole = Hole(name=label, points=flat[loop[::-1]], kind=kind)
+        if kind == "cutout":
+            with optional_step(f"{label} of {piece} is not cut, and drawn dashed") as left_out:
+                check_hole(f"piece {piece!r}", hole)
+            if left_out:
+                borders[label + LEFT_OUT] = flat[np.append(loop, loop[0])]
+                continue
+        holes.append(hole)
+    return holes, borders
 
 
 def line_labels(loop: IntArray, curves: Mapping[str, IntArray]) -> list[str]:

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from warpflat.core import FloatArray, arc_lengths, optional_step, without_side
-from warpflat.pattern.drafting.curves import Curve, split_bezier
+from warpflat.pattern.drafting.curves import Curve, chords, farthest, split_bezier
 from warpflat.pattern.drafting.draft import draft_half
-from warpflat.pattern.drafting.drafted import DraftedEdge, DraftedGarment, DraftedPiece
-from warpflat.pattern.drafting.piece_parts import Edge, Hole
-from warpflat.pattern.drafting.pieces import Piece, Seam
+from warpflat.pattern.drafting.drafted import DraftedEdge, DraftedGarment, DraftedPiece, Notch
+from warpflat.pattern.drafting.piece_parts import SAME_POINT, Edge, Hole
+from warpflat.pattern.drafting.pieces import Seam
+from warpflat.pattern.drafting.seam_difference import SEAM_TOLERANCE
 
 __all__ = ["halved", "is_symmetric"]
 
 
-#: A piece's cut line may stray from its mirror image by this much [m]; lines inside, which are only drawn, by more.
-SYMMETRIC, INNER = 5e-4, 2e-3
+#: A piece's cut line may stray from its mirror image by as much as its sides may differ where they are sewn [m]; lines inside, which are
+#: only drawn, by more.
+SYMMETRIC, INNER = SEAM_TOLERANCE, 2e-3
 #: Narrower pieces [m] stay whole: half of them saves no paper.
 NARROW = 0.10
-#: What lies closer to the axis than this [m] lies on it.
-ON_AXIS = 1e-6
 
 
 def halved(garment: DraftedGarment) -> DraftedGarment:
@@ -55,35 +55,33 @@ def is_symmetric(piece: DraftedPiece) -> bool:
         return False
     axis = _axis(piece)
 
-    def strays(line: FloatArray, others: FloatArray) -> float:
-        return float(shapely.hausdorff_distance(shapely.LineString(line), shapely.LineString(others)))
+    def image(points: FloatArray) -> FloatArray:
+        return points * [-1.0, 1.0] + [2 * axis, 0.0]
 
-    mirror = np.array([-1.0, 1.0])
-    ring = shapely.LinearRing(piece.cut_line)
-    image = piece.cut_line * mirror + [2 * axis, 0]
-    if float(shapely.distance(ring, shapely.points(image)).max()) > SYMMETRIC:
+    def has_images(points: Sequence[FloatArray]) -> bool:
+        """Return whether the mirror image of each point is one of them, too."""
+        found = np.array(points).reshape(-1, 2)
+        return not any(np.linalg.norm(found - at, axis=1).min() > INNER for at in image(found))
+
+    def line_has_image(line: FloatArray, others: Iterable[FloatArray]) -> bool:
+        strings = map(shapely.LineString, others)
+        return bool(min(shapely.hausdorff_distance(shapely.LineString(image(line)), each) for each in strings) <= INNER)
+
+    around, tips = np.concatenate([piece.cut_line, piece.cut_line[:1]]), [dart.tip for dart in piece.darts]
+    if farthest(around, image(piece.cut_line)) > SYMMETRIC or not has_images(tips):
         return False
-    tips = np.array([dart.tip for dart in piece.darts]).reshape(-1, 2)
-    images = tips * mirror + [2 * axis, 0]
-    if any(np.linalg.norm(tips - tip, axis=1).min() > INNER for tip in images):
-        return False
-    if (np.abs(tips[:, 0] - axis) <= INNER).any():
+    if any(abs(tip[0] - axis) <= INNER for tip in tips):
         # One leg of a dart in the middle would be lost on the fold.
         return False
     # A strip is sewn to pieces that are not its mirror images: its notches must be so themselves.
-    notched = np.array([base for notch in piece.notches for base in notch.base]).reshape(-1, 2)
-    if piece.piece.role in ("strip", "waistband", "cuff", "collar", "hood") and any(
-        np.linalg.norm(notched - base, axis=1).min() > INNER for base in notched * mirror + [2 * axis, 0]
-    ):
+    strip = piece.piece.role in ("strip", "waistband", "cuff", "collar", "hood")
+    if strip and not has_images([base for notch in piece.notches for base in notch.base]):
         return False
-    marks = np.array([hole.at for hole in piece.drill_holes]).reshape(-1, 2)
-    if any(np.linalg.norm(marks - mark, axis=1).min() > INNER for mark in marks * mirror + [2 * axis, 0]):
+    if not has_images([hole.at for hole in piece.drill_holes]):
         return False
-    return all(
-        min(strays(line * mirror + [2 * axis, 0], other) for other in lines) <= INNER
-        for lines in (list(piece.internal_lines.values()), list(piece.fisheyes.values()))
-        for line in lines
-    ) and not any(np.ptp(np.sign(line[:, 0] - axis)) for line in piece.fisheyes.values())
+    groups = [list(piece.internal_lines.values()), list(piece.fisheyes.values())]
+    crosses = any(np.ptp(np.sign(line[:, 0] - axis)) for line in piece.fisheyes.values())
+    return all(line_has_image(line, lines) for lines in groups for line in lines) and not crosses
 
 
 def _axis(piece: DraftedPiece) -> float:
@@ -107,7 +105,7 @@ def _kept_side(piece: DraftedPiece, seams: Sequence[Seam]) -> float:
 
 def _side_of(line: FloatArray, axis: float) -> float:
     """Return on which side of the axis a line lies, -1 or 1 along x; 0 if it crosses it."""
-    return float(np.sign(line[:, 0].min() - axis + ON_AXIS) + np.sign(line[:, 0].max() - axis - ON_AXIS)) / 2
+    return float(np.sign(line[:, 0].min() - axis + SAME_POINT) + np.sign(line[:, 0].max() - axis - SAME_POINT)) / 2
 
 
 def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedPiece:
@@ -115,6 +113,72 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
     import shapely
 
     axis = _axis(piece)
+    edges = _clipped_edges(piece, axis, side)
+    ends = edges[-1].line[-1], edges[0].line[0]
+    shift = -min(ends, key=lambda end: float(end[1]))
+    names = {edge.name: without_side(edge.name) for edge in edges}
+    if len(set(names.values())) < len(names):
+        names = {name: name for name in names}
+    moved = [
+        _with_curve(edge, replace(edge.curve, bezier=edge.curve.bezier + shift), names[edge.name]) for edge in edges
+    ]
+    # The edge along the axis is named as the line of the piece that lies there.
+    along = [name for name, line in piece.internal_lines.items() if np.abs(line[:, 0] - axis).max() < INNER]
+    name = next((name for name in along if name not in names.values()), "fold")
+    fold = chords(np.stack(ends) + shift)
+    points = fold.nodes
+    drafted = DraftedEdge(
+        edge=Edge(name=name, points=points, kind="fold"),
+        curve=fold,
+        line=points,
+        width=0.0,
+        places=arc_lengths(points),
+        fit_error=0.0,
+        tolerance=0.0,
+    )
+    # The parts of lines on one side of the axis, without those that lie on it.
+    far = 10.0
+    box = shapely.box(min(axis, axis + side * far), -far, max(axis, axis + side * far), far)
+    lines: dict[str, FloatArray] = {}
+    for name, line in piece.internal_lines.items():
+        for part in shapely.get_parts(shapely.intersection(shapely.LineString(line), box)):
+            points = shapely.get_coordinates(part)
+            if len(points) > 1 and np.abs(points[:, 0] - axis).max() > INNER:
+                lines.setdefault(without_side(name), points + shift)
+    half = replace(
+        piece.piece,
+        edges=[*(edge.edge for edge in moved), drafted.edge],
+        darts=[
+            replace(
+                dart.dart, name=without_side(dart.dart.name), left=names[dart.dart.left], right=names[dart.dart.right]
+            )
+            for dart in piece.darts
+            if dart.dart.left in names
+        ],
+        holes=[
+            Hole(name=without_side(name), points=line + shift, kind="dart")
+            for name, line in piece.fisheyes.items()
+            if side * (line[0, 0] - axis) > 0.0
+        ],
+        internal_lines=lines,
+        marks={
+            hole.name: hole.at + shift
+            for hole in piece.drill_holes
+            if hole.name in piece.piece.marks and side * (hole.at[0] - axis) > -SAME_POINT
+        },
+        grain=None,
+        at="",
+        placement=None,
+        levels={},
+    )
+    on_side = _notches_beside(piece, garment.garment.seams, names, axis, side)
+    notches = tuple(_on_half(notch, moved, shift, side) for notch in on_side)
+    drawn = draft_half(half, garment.name, (*moved, drafted), notches, piece.notes)
+    return replace(drawn, enlarged=piece.enlarged)
+
+
+def _clipped_edges(piece: DraftedPiece, axis: float, side: float) -> list[DraftedEdge]:
+    """Return what of a piece's edges lies on one side of its axis, in order, the first after the gap where the other half was."""
     edges = []
     for whole in piece.edges:
         clipped = [_clipped(control, axis, side) for control in whole.curve.bezier]
@@ -122,126 +186,58 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
         if has_part.any():
             bezier = np.stack([part for part in clipped if part is not None])
             edges.append(_with_curve(whole, Curve(bezier=bezier, straight=whole.curve.straight[has_part])))
-    # The first edge after the gap where the other half was.
-    first = next(
-        k
-        for k in range(len(edges))
-        if float(np.linalg.norm(edges[k - 1].curve.bezier[-1, 3] - edges[k].curve.bezier[0, 0])) > 10 * ON_AXIS
-    )
-    edges = [*edges[first:], *edges[:first]]
-    start, end = edges[-1].curve.bezier[-1, 3], edges[0].curve.bezier[0, 0]
-    low = start if start[1] < end[1] else end
-    shift = -low
-    edges = [_with_curve(edge, Curve(bezier=edge.curve.bezier + shift, straight=edge.curve.straight)) for edge in edges]
-    names = {edge.name: without_side(edge.name) for edge in edges}
-    if len(set(names.values())) < len(names):
-        names = {name: name for name in names}
-    edges = [replace(edge, edge=replace(edge.edge, name=names[edge.name])) for edge in edges]
-    # The edge along the axis is named as the line of the piece that lies there.
-    start, end = edges[-1].line[-1], edges[0].line[0]
-    taken = {edge.name for edge in edges}
-    candidates = [
-        name for name, line in piece.internal_lines.items() if np.abs(line[:, 0] - _axis(piece)).max() < INNER
-    ]
-    name = next((name for name in candidates if name not in taken), "fold")
-    thirds = np.stack([start + k / 3 * (end - start) for k in range(4)])
-    curve = Curve(bezier=thirds[None], straight=np.array([True]))
-    edge = Edge(name=name, points=np.stack([start, end]), kind="fold")
-    edges.append(
-        DraftedEdge(
-            edge=edge,
-            curve=curve,
-            line=np.stack([start, end]),
-            width=0.0,
-            places=np.array([0.0, float(np.linalg.norm(end - start))]),
-            fit_error=0.0,
-            tolerance=0.0,
-        )
-    )
-    darts = [
-        replace(dart.dart, name=without_side(dart.dart.name), left=names[dart.dart.left], right=names[dart.dart.right])
-        for dart in piece.darts
-        if dart.dart.left in names
-    ]
-    holes = [
-        Hole(name=without_side(name), points=line + shift, kind="dart")
-        for name, line in piece.fisheyes.items()
-        if side * (line[0, 0] - axis) > 0.0
-    ]
-    # The parts of lines on one side of the axis, without those that lie on it.
-    far = 10.0
-    box = shapely.box(min(axis, axis + side * far), -far, max(axis, axis + side * far), far)
-    kept: dict[str, FloatArray] = {}
-    for name, line in piece.internal_lines.items():
-        inside = shapely.intersection(shapely.LineString(line), box)
-        parts = [part for part in shapely.get_parts(inside) if part.geom_type == "LineString"]
-        for part in parts:
-            points = np.asarray(part.coords)
-            if len(points) > 1 and np.abs(points[:, 0] - axis).max() > INNER and without_side(name) not in kept:
-                kept[without_side(name)] = points + shift
-    half = Piece(
-        name=piece.name,
-        size=piece.size,
-        fabric=piece.piece.fabric,
-        quantity=piece.piece.quantity,
-        edges=[edge.edge for edge in edges],
-        darts=darts,
-        holes=holes,
-        internal_lines=kept,
-        marks={
-            hole.name: hole.at + shift
-            for hole in piece.drill_holes
-            if hole.name in piece.piece.marks and side * (hole.at[0] - axis) > -ON_AXIS
-        },
-        role=piece.piece.role,
-        also=piece.piece.also,
-        paired=piece.piece.paired,
-        title=piece.piece.title,
-        units=piece.piece.units,
-    )
-    # The notches of seams on one side of the axis, each on its edge of the half. A seam across the axis (a waist) whose
-    # notches all lie on the other side gets their mirror images.
-    lines = [(e.name, e.line - shift) for e in edges[:-1]]
-    axis, dart_names = _axis(piece), {dart.dart.name for dart in piece.darts}
+    gaps = [float(np.linalg.norm(edges[k - 1].line[-1] - edges[k].line[0])) for k in range(len(edges))]
+    first = next(k for k, gap in enumerate(gaps) if gap > 10 * SAME_POINT)
+    return [*edges[first:], *edges[:first]]
+
+
+def _notches_beside(
+    piece: DraftedPiece, seams: Sequence[Seam], edges: Collection[str], axis: float, side: float
+) -> list[Notch]:
+    """Return the notches of seams on one side of the axis.
+
+    A seam across the axis (a waist) whose notches all lie on the other side gets their mirror images.
+    """
+    darts = {dart.dart.name for dart in piece.darts}
     on_side = [
-        n for n in piece.notches if n.seam not in dart_names and n.edge in names and side * (n.at[0] - axis) > -ON_AXIS
+        notch
+        for notch in piece.notches
+        if notch.seam not in darts and notch.edge in edges and side * (notch.at[0] - axis) > -SAME_POINT
     ]
-    across = {
-        seam.name for seam in garment.garment.seams for s in seam.stretches if s.piece == piece.name and s.edge in names
-    }
+    across = {seam.name for seam in seams for s in seam.stretches if s.piece == piece.name and s.edge in edges}
     across -= {notch.seam for notch in on_side}
     flip, moved_by = np.array([-1.0, 1.0]), np.array([2 * axis, 0.0])
     for notch in piece.notches:
         if notch.seam in across:
             bases = tuple(base * flip + moved_by for base in notch.base)
             on_side.append(replace(notch, at=notch.at * flip + moved_by, base=bases, direction=notch.direction * flip))
-    drawn = [shapely.LineString(line) for _, line in lines]
-    nearest = [lines[int(np.argmin(shapely.distance(drawn, shapely.Point(notch.at))))][0] for notch in on_side]
-    notches = []
-    for notch, name in zip(on_side, nearest, strict=True):
-        placed = replace(notch, edge=name, at=notch.at + shift, base=tuple(base + shift for base in notch.base))
-        if abs(placed.at[0]) <= SYMMETRIC and len(placed.base) == 1:
-            # Its slit runs along the fold, x = 0.
-            upright = np.array([0.0, 1.0])
-            placed = replace(
-                placed, at=placed.at * upright, base=(placed.base[0] * upright,),
-                direction=np.sign(placed.direction[1]) * upright,
-            )  # fmt: skip
-        # Of a double notch on the fold one slit is the other's mirror image.
-        placed = replace(placed, base=tuple(base for base in placed.base if side * base[0] >= -SYMMETRIC))
-        notches.append(placed)
-    return replace(draft_half(half, garment.name, tuple(edges), tuple(notches), piece.notes), enlarged=piece.enlarged)
+    return on_side
+
+
+def _on_half(notch: Notch, edges: Sequence[DraftedEdge], shift: FloatArray, side: float) -> Notch:
+    """Return a notch on the nearest edge of the half, moved with it."""
+    import shapely
+
+    at, bases, direction = notch.at + shift, [base + shift for base in notch.base], notch.direction
+    nearest = min(edges, key=lambda edge: float(shapely.LineString(edge.line).distance(shapely.Point(at))))
+    if abs(at[0]) <= SYMMETRIC and len(bases) == 1:
+        # Its slit runs along the fold, x = 0.
+        upright = np.array([0.0, 1.0])
+        at, bases, direction = at * upright, [bases[0] * upright], np.sign(direction[1]) * upright
+    # Of a double notch on the fold one slit is the other's mirror image.
+    bases = [base for base in bases if side * base[0] >= -SYMMETRIC]
+    return replace(notch, edge=nearest.name, at=at, base=tuple(bases), direction=direction)
 
 
 def _clipped(control: FloatArray, axis: float, side: float) -> FloatArray | None:
     """Return the part of a cubic (4 by 2) on one side of a line x = axis that it crosses once at most."""
     away = side * (control[:, 0] - axis)
-    if abs(away[0]) <= ON_AXIS and abs(away[3]) <= ON_AXIS:
+    if abs(away[0]) <= SAME_POINT and abs(away[3]) <= SAME_POINT:
         # It bows to one side, as the edge of a gore from tip to tip.
-        return control if away[1] + away[2] > ON_AXIS else None
-    if away[0] <= ON_AXIS and away[3] <= ON_AXIS:
+        return control if away[1] + away[2] > SAME_POINT else None
+    if away[0] <= SAME_POINT and away[3] <= SAME_POINT:
         return None
-    if away[0] >= -ON_AXIS and away[3] >= -ON_AXIS:
+    if away[0] >= -SAME_POINT and away[3] >= -SAME_POINT:
         return control
     a, b, c, d = away
     roots = np.roots([d - 3 * c + 3 * b - a, 3 * c - 6 * b + 3 * a, 3 * b - 3 * a, a])
@@ -251,8 +247,8 @@ def _clipped(control: FloatArray, axis: float, side: float) -> FloatArray | None
     return before if away[0] > 0 else after
 
 
-def _with_curve(edge: DraftedEdge, curve: Curve) -> DraftedEdge:
-    """Return an edge along another curve, of the same name, kind and width."""
+def _with_curve(edge: DraftedEdge, curve: Curve, name: str = "") -> DraftedEdge:
+    """Return an edge along another curve, of the same kind and width, and of the same name if no other is given."""
     line = curve.sample()
-    shortened = Edge(name=edge.name, points=line, kind=edge.kind, allowance=edge.width)
+    shortened = Edge(name=name or edge.name, points=line, kind=edge.kind, allowance=edge.width)
     return replace(edge, edge=shortened, curve=curve, line=line, places=arc_lengths(line))

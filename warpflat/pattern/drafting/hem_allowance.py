@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray
+from warpflat.core import polyline_length
 from warpflat.pattern.drafting.polygons import (
     cut_off,
     difference,
     intersection,
+    normal_towards,
     parallelogram,
     reflect,
+    turn_between,
     union,
     unit_vector,
 )
@@ -23,77 +24,48 @@ from warpflat.pattern.drafting.sides import MITRE_REACH, Side, Wedge
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon
 
-__all__ = ["HEM_SLANT", "HemEnd", "find_hem_end", "fold_hem"]
+__all__ = ["HEM_SLANT", "fold_hem"]
 
 
 #: A hem folds up along itself; its ends mirror the side seams if these meet it at 90 degrees, give or take this [rad].
 HEM_SLANT = np.radians(40.0)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class HemEnd:
-    """A corner at which a hem meets a seam.
+def fold_hem(
+    sides: Sequence[Side | Wedge], strips: list[Geometry], index: int, after: int, body: Polygon
+) -> list[Geometry] | None:
+    """Mirror a hem's end on the hem line, so that turned up it covers the seam allowance exactly.
 
-    Attributes:
-        corner: [m].
-        hem, seam: indices of the two sides.
-        inwards: unit vector from the corner along the hem.
-        beyond: unit vector from the corner along the seam, away from the piece.
-        hem_width, seam_width: allowances [m].
+    Args:
+        sides: of the piece, in order.
+        strips: the allowance of every side; those of the hem and the seam are trimmed in place.
+        index, after: two sides that follow each other.
+        body: the piece.
+
+    Returns:
+        What is added to the strips; None where no hem is folded between these sides.
     """
+    import shapely
 
-    corner: FloatArray
-    hem: int
-    seam: int
-    inwards: FloatArray
-    beyond: FloatArray
-    hem_width: float
-    seam_width: float
-
-
-def find_hem_end(sides: Sequence[Side | Wedge], index: int, after: int) -> HemEnd | None:
-    """Return the hem's end between two neighbouring sides; None where no hem is folded there."""
     side, follows = sides[index], sides[after]
     if not isinstance(side, Side) or not isinstance(follows, Side) or {side.kind, follows.kind} != {"hem", "seam"}:
         return None
     a, b = unit_vector(side.points[-1] - side.points[-2]), unit_vector(follows.points[1] - follows.points[0])
-    turn = float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
-    if abs(turn - np.pi / 2) >= HEM_SLANT:
+    if abs(turn_between(a, b) - np.pi / 2) >= HEM_SLANT:
         return None
-    corner = side.points[-1]
-    if side.kind == "hem":
-        hem, seam = side, follows
-        end = HemEnd(
-            corner=corner, hem=index, seam=after, inwards=-a, beyond=-b, hem_width=hem.width, seam_width=seam.width
-        )
-    else:
-        hem, seam = follows, side
-        end = HemEnd(
-            corner=corner, hem=after, seam=index, inwards=b, beyond=a, hem_width=hem.width, seam_width=seam.width
-        )
+    # Of the hem and of the seam the number, the side, and the way from the corner along it.
+    ends = ((index, side, -a), (after, follows, b))
+    (hem, hem_side, inwards), (seam, seam_side, along) = ends if side.kind == "hem" else ends[::-1]
+    hem_width, width, corner, beyond = hem_side.width, seam_side.width, side.points[-1], -along
     # Beside a seam that is shorter than the hem is deep there is nothing to mirror.
-    room = float(np.linalg.norm(np.diff(seam.points, axis=0), axis=1).sum())
-    return end if seam.width > 0 and 0 < hem.width <= room else None
-
-
-def fold_hem(end: HemEnd, strips: list[Geometry], body: Polygon, far: Geometry) -> list[Geometry]:
-    """Mirror a hem's end on the hem line, so that turned up it covers the seam allowance exactly.
-
-    Args:
-        end: where.
-        strips: the allowance of every side; those of the hem and the seam are trimmed in place.
-        body: the piece.
-        far: cloth beside the edge at the hem's other end, on which a short hem is turned up too.
-
-    Returns:
-        What is added to the strips.
-    """
-    corner, inwards, beyond, hem, seam = end.corner, end.inwards, end.beyond, end.hem, end.seam
-    width, hem_width = end.seam_width, end.hem_width
-    down = np.array([inwards[1], -inwards[0]])
-    down = down if down @ beyond > 0 else -down
-    out = np.array([beyond[1], -beyond[0]])
-    out = out if out @ inwards < 0 else -out
+    if not (width > 0 and 0 < hem_width <= polyline_length(seam_side.points)):
+        return None
+    # Cloth beside the edge at the hem's other end, on which a short hem is turned up, too.
+    other = index - 1 if hem == index else (after + 1) % len(sides)
+    far, far_side = strips[other], sides[other]
+    if isinstance(far_side, Wedge):
+        far = shapely.Polygon(np.concatenate([far_side.left, far_side.right[1:]])).buffer(0)
+    down, out = normal_towards(inwards, beyond), normal_towards(beyond, -inwards)
     reach = hem_width + MITRE_REACH * width
     run_on = parallelogram(corner, beyond, (0, reach), out, (0, width))
     run_on = intersection(run_on, parallelogram(corner, inwards, (-3 * reach, reach), -down, (0, 3 * reach)))

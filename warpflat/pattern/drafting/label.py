@@ -13,6 +13,7 @@ import numpy as np
 from warpflat.core import FloatArray, size_words
 from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.pieces import Piece
+from warpflat.pattern.drafting.polygons import rotation
 from warpflat.pattern.drafting.words import translate
 
 if TYPE_CHECKING:
@@ -28,11 +29,11 @@ __all__ = [
     "TITLE",
     "Label",
     "Words",
+    "box_around",
     "cutting_words",
     "embedded_font",
     "label_lines",
     "printed_size",
-    "rotation",
     "text_width",
     "wrap_text",
 ]
@@ -71,8 +72,13 @@ class Words:
 
     def box(self) -> FloatArray:
         """Return the corners of what it covers, 4 by 2 [m]; tails below the line count."""
-        half = np.array([text_width(self.text, self.height, bold=self.bold) / 2, self.height * TAILS / 2])
-        return self.at + (half * [[-1, -1], [1, -1], [1, 1], [-1, 1]]) @ rotation(self.angle).T
+        return box_around(self.at, text_width(self.text, self.height, bold=self.bold), self.height * TAILS, self.angle)
+
+
+def box_around(at: FloatArray, width: float, height: float, angle: float = 0.0) -> FloatArray:
+    """Return the corners of a box around its centre, turned by an angle [rad], counter-clockwise from the lower left, 4 by 2."""
+    corners = np.array([width, height]) / 2 * [[-1, -1], [1, -1], [1, 1], [-1, 1]]
+    return np.asarray(at + corners @ rotation(angle).T)
 
 
 @cache
@@ -140,8 +146,7 @@ class Label:
     @property
     def box(self) -> FloatArray:
         """Corners of the block, 4 by 2 [m]."""
-        half = np.array([self.width, self.height]) / 2
-        return self.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]] @ rotation(self.angle).T
+        return box_around(self.at, self.width, self.height, self.angle)
 
     def words(self) -> list[Words]:
         """Return each row at its place."""
@@ -199,9 +204,3 @@ def cutting_words(piece: Piece) -> str:
 def printed_size(size: str) -> str:
     """Return the words for a size as they are printed."""
     return translate("size {size}", size=size) if size_words(size) != size else translate(size)
-
-
-def rotation(angle: float) -> FloatArray:
-    """Return the 2 by 2 matrix of a turn by an angle [rad], counter-clockwise."""
-    cosine, sine = np.cos(angle), np.sin(angle)
-    return np.array([[cosine, -sine], [sine, cosine]])

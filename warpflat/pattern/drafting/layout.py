@@ -10,6 +10,7 @@ import numpy as np
 from warpflat.core import FloatArray
 from warpflat.pattern.drafting.draft import nest_label
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
+from warpflat.pattern.drafting.polygons import mapped
 
 __all__ = ["Placed", "Sheet", "lay_out", "nests", "occupied_points"]
 
@@ -21,12 +22,10 @@ class Placed:
     Attributes:
         pieces: upon each other.
         matrix: 2 by 3, from the pieces' coordinates to the sheet's [m]: a turn and a shift.
-        box: lower left and upper right on the sheet [m].
     """
 
     pieces: tuple[DraftedPiece, ...]
     matrix: FloatArray
-    box: FloatArray
 
     @property
     def offset(self) -> FloatArray:
@@ -35,7 +34,7 @@ class Placed:
 
     def on_sheet(self, points: FloatArray) -> FloatArray:
         """Return points of the pieces (#P by 2 [m]) on the sheet."""
-        return points @ self.matrix[:, :2].T + self.matrix[:, 2]
+        return mapped(points, self.matrix)
 
     def on_piece(self, points: FloatArray) -> FloatArray:
         """Return points of the sheet (#P by 2 [m]) in the pieces' coordinates."""
@@ -57,9 +56,17 @@ class Sheet:
     reserved: FloatArray | None = None
 
 
-def nests(garment: DraftedGarment) -> list[tuple[DraftedPiece, ...]]:
-    """Return each piece in all its drafted sizes."""
-    return [garment.all_sizes(name) for name in garment.piece_names]
+def nests(garment: DraftedGarment, sizes: Sequence[str] | None = None) -> list[tuple[DraftedPiece, ...]]:
+    """Return each piece in all its drafted sizes, or in some of them.
+
+    Raises:
+        InputError: an unknown size.
+    """
+    for size in sizes or ():
+        garment.garment.check_size(size)
+    rows = (garment.all_sizes(name) for name in garment.piece_names)
+    chosen = (tuple(piece for piece in row if sizes is None or piece.size in sizes) for row in rows)
+    return [row for row in chosen if row]
 
 
 def occupied_points(group: Sequence[DraftedPiece]) -> FloatArray:
@@ -116,7 +123,6 @@ def lay_out(
     corners = {i: np.array([place[0], total[1] - place[1]]) for i, place in places.items()}
     placed = []
     for i, group in enumerate(groups):
-        offset = corners[i] - boxes[i][0]
-        matrix = np.column_stack([np.eye(2), offset])
-        placed.append(Placed(pieces=tuple(group), matrix=matrix, box=np.stack([corners[i], corners[i] + extents[i]])))
+        matrix = np.column_stack([np.eye(2), corners[i] - boxes[i][0]])
+        placed.append(Placed(pieces=tuple(group), matrix=matrix))
     return Sheet(placed=tuple(placed), size=total, reserved=corners.get(len(groups)))

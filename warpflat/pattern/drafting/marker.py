@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from warpflat.core import FloatArray, InputError, nearest, size_words, thread_count
-from warpflat.pattern.drafting.cut_list import cloths_of
-from warpflat.pattern.drafting.drafted import DraftedEdge, DraftedGarment, DraftedPiece
+from warpflat.pattern.drafting.cut_list import cloths_of, turned_over
+from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.label import Label, printed_size
 from warpflat.pattern.drafting.matched_lay import Stripes
 from warpflat.pattern.drafting.pieces import unknown_size
 from warpflat.pattern.drafting.placement import fit_label
+from warpflat.pattern.drafting.polygons import mapped, mirror_image, rotation
 from warpflat.pattern.drafting.tile_nesting import CELL, nest_on_strip
 from warpflat.pattern.drafting.words import printed_in, translate
 
@@ -60,6 +62,11 @@ class Cloth:
         """Whether pieces have to lie where the fold or the stripes want them."""
         return self.folded or bool(self.stripes.seams and self.stripes.repeat.any())
 
+    @property
+    def lay_width(self) -> float:
+        """Width on which pieces are laid [m]: half of that of folded cloth."""
+        return 0.5 * self.width if self.folded else self.width
+
     def __post_init__(self) -> None:
         if not 0.1 <= self.width <= 10:
             raise InputError(f"cloth width {self.width!r} m; it must be between 0.1 and 10 m")
@@ -76,7 +83,6 @@ class Copy:
     Attributes:
         piece: what is copied.
         mirrored: cut turned over.
-        turned: pointing the other way along the warp.
         matrix: 2 by 3, from the drafted piece to the cloth.
         cut_line, cutouts, notches, grain: #P by 2 [m].
         fold_lines: lines at which the two halves meet, #P by 2 [m].
@@ -85,7 +91,6 @@ class Copy:
 
     piece: DraftedPiece
     mirrored: bool
-    turned: bool
     matrix: FloatArray
     cut_line: FloatArray
     cutouts: tuple[FloatArray, ...]
@@ -93,6 +98,11 @@ class Copy:
     grain: FloatArray
     name: Label | None
     notches: tuple[FloatArray, ...]
+
+    @property
+    def turned(self) -> bool:
+        """Whether it points the other way along the warp."""
+        return bool(self.matrix[0, 1] < 0.0)
 
     @property
     def label(self) -> str:
@@ -157,27 +167,31 @@ def make_marker(
     """
     wanted = dict.fromkeys(garment.pieces, 1) if sizes is None else sizes
     if cloth.by_rule:
-        return _marker_by_rule(garment, cloth, fabric, wanted)
-    copies = _copies(garment, fabric, wanted)
-    tries = [copies]
-    if cloth.reversible and any(mirrored for _, mirrored in copies):
-        tries.append([(piece, False) for piece, _ in copies])
-    share = max(1, seconds // len(tries))
-    plans = [_nest(garment.name, plan, cloth, share, seed) for plan in tries]
+        placements = _laid_by_rule(garment, cloth, fabric, wanted)
+    else:
+        copies = _copies(garment, fabric, wanted)
+        tries = [copies]
+        if cloth.reversible and any(mirrored for _, mirrored in copies):
+            tries.append([(piece, False) for piece, _ in copies])
+        share = max(1, seconds // len(tries))
+        placements = min((_nest(garment.name, plan, cloth, share, seed) for plan in tries), key=_length)
+    # In the order in which the cutter meets them.
+    placements = sorted(placements, key=lambda copy: tuple(copy.cut_line.min(axis=0)))
     with printed_in(garment.garment.words):
-        placements = [_named(copy) for copy in min(plans, key=_length)]
+        named = tuple(_named(copy) for copy in placements)
     marker = Marker(
         name=garment.name,
         fabric=fabric,
-        width=cloth.width,
-        length=_length(placements) + cloth.gap,
-        placements=tuple(placements),
+        width=cloth.lay_width,
+        length=_length(named) + cloth.gap,
+        placements=named,
+        folded=cloth.folded,
     )
     _check(marker)
     return marker
 
 
-def _marker_by_rule(garment: DraftedGarment, cloth: Cloth, fabric: str, sizes: Mapping[str, int]) -> Marker:
+def _laid_by_rule(garment: DraftedGarment, cloth: Cloth, fabric: str, sizes: Mapping[str, int]) -> list[Copy]:
     """Lay the pieces on folded cloth, or so that stripes meet."""
     from warpflat.pattern.drafting.half_pieces import halved
     from warpflat.pattern.drafting.matched_lay import Laid, lay_by_rule
@@ -198,37 +212,20 @@ def _marker_by_rule(garment: DraftedGarment, cloth: Cloth, fabric: str, sizes: M
             linear = _onto_cloth(True)
         outline = piece.cut_line if on_fold else unfold_piece(piece)
         copies.append(Laid(piece=piece, mirrored=mirrored, linear=linear, outline=outline, at_fold=on_fold))
-    width = 0.5 * cloth.width if cloth.folded else cloth.width
-    laid = lay_by_rule(copies, width, cloth.gap, cloth.stripes, garment)
-    placements = [
-        _placed(
-            each.piece,
-            each.mirrored,
-            each.linear,
-            0.0,
-            (1e3 * each.shift[0], 1e3 * each.shift[1]),
-            0.0,
-            half=each.at_fold,
-        )
-        for each in laid
+    shifts = lay_by_rule(copies, cloth.lay_width, cloth.gap, cloth.stripes, garment)
+    return [
+        _placed(each.piece, each.mirrored, np.column_stack([each.linear, shift]), half=each.at_fold)
+        for each, shift in zip(copies, shifts, strict=True)
     ]
-    with printed_in(garment.garment.words):
-        placements = [_named(copy) for copy in sorted(placements, key=lambda copy: tuple(copy.cut_line.min(axis=0)))]
-    marker = Marker(
-        name=garment.name, fabric=fabric, width=width, length=_length(placements) + cloth.gap,
-        placements=tuple(placements), folded=cloth.folded,
-    )  # fmt: skip
-    _check(marker)
-    return marker
 
 
-def _length(placements: list[Copy]) -> float:
+def _length(placements: Sequence[Copy]) -> float:
     """Return the length [m] of cloth that copies take."""
     return max(float(copy.cut_line[:, 0].max()) for copy in placements)
 
 
 def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seconds: int, seed: int) -> list[Copy]:
-    """Nest the copies with sparrow, and return them in the order in which the cutter meets them."""
+    """Nest the copies with sparrow."""
     import shapely
     import spyrrow
 
@@ -269,9 +266,9 @@ def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seco
             raise
         raise InputError(f"the nesting solver gave up ({error}); wider cloth or a smaller gap may help") from None
     for item in placed:
-        piece, mirrored = copies[int(item.id)]
-        placements.append(_placed(piece, mirrored, matrices[int(item.id)], item.rotation, item.translation, cloth.gap))
-    return sorted(placements, key=lambda copy: (copy.cut_line[:, 0].min(), copy.cut_line[:, 1].min()))
+        turned, shift = rotation(np.radians(item.rotation)) @ matrices[int(item.id)], np.array(item.translation) / 1000
+        placements.append(_placed(*copies[int(item.id)], np.column_stack([turned, shift + cloth.gap])))
+    return placements
 
 
 def _check(marker: Marker) -> None:
@@ -294,19 +291,11 @@ def unfold_piece(piece: DraftedPiece) -> FloatArray:
 
     whole = shapely.Polygon(piece.cut_line)
     for edge in piece.fold_edges:
-        mirror = shapely.transform(whole, _mirror(edge))
+        mirror = shapely.transform(whole, partial(mirror_image, line=edge.line))
         # Both halves end on the fold within rounding; a tiny overlap joins them.
         joined = shapely.union_all([half.buffer(2e-6, join_style="mitre") for half in (whole, mirror)])
         whole = max(shapely.get_parts(joined.buffer(-2e-6, join_style="mitre")), key=lambda part: part.area)
     return np.asarray(shapely.orient_polygons(shapely.Polygon(whole.exterior)).exterior.coords)[:-1]
-
-
-def _mirror(edge: DraftedEdge) -> Callable[[FloatArray], FloatArray]:
-    """Return the reflection on the line of a fold, for #P by 2 points."""
-    start = edge.line[0]
-    x, y = (edge.line[-1] - start) / np.linalg.norm(edge.line[-1] - start)
-    turn = np.array([[2 * x * x - 1, 2 * x * y], [2 * x * y, 2 * y * y - 1]])
-    return lambda points: (points - start) @ turn.T + start
 
 
 def _copies(garment: DraftedGarment, fabric: str, sizes: Mapping[str, int]) -> list[tuple[DraftedPiece, bool]]:
@@ -319,9 +308,7 @@ def _copies(garment: DraftedGarment, fabric: str, sizes: Mapping[str, int]) -> l
             raise InputError(f"{count} garments of size {size}; it must be 1 or more")
         for piece in garment.pieces[size]:
             quantity = cloths_of(piece).get(fabric, 0) if fabric else piece.piece.quantity
-            total = quantity * count
-            pairs = piece.piece.paired and not piece.piece.on_fold and quantity % 2 == 0
-            copies += [(piece, pairs and k % 2 == 1) for k in range(total)]
+            copies += [(piece, over) for over in turned_over(piece, quantity) * count]
     if not copies:
         known = {cloth for pieces in garment.pieces.values() for piece in pieces for cloth in cloths_of(piece)}
         raise InputError(f"no piece is of fabric {fabric!r}; {nearest(fabric, known)}")
@@ -333,33 +320,17 @@ def _onto_cloth(mirrored: bool) -> FloatArray:
     return np.array([[0.0, 1.0], [1.0, 0.0]]) if mirrored else np.array([[0.0, 1.0], [-1.0, 0.0]])
 
 
-def _placed(
-    piece: DraftedPiece,
-    mirrored: bool,
-    linear: FloatArray,
-    degrees: float,
-    shift: tuple[float, float],
-    margin: float,
-    *,
-    half: bool = False,
-) -> Copy:
-    """Return a copy at the solver's place; a half one where it lies against the fold of the cloth."""
-    angle = np.radians(degrees)
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    matrix = np.column_stack([turn @ linear, np.array(shift) / 1000 + margin])
-
-    def moved(points: FloatArray) -> FloatArray:
-        return points @ matrix[:, :2].T + matrix[:, 2]
-
+def _placed(piece: DraftedPiece, mirrored: bool, matrix: FloatArray, *, half: bool = False) -> Copy:
+    """Return a copy under a 2 by 3 matrix; a half one where it lies against the fold of the cloth."""
+    moved = partial(mapped, matrix=matrix)
     cutouts = [cutout.cut_line for cutout in piece.cutouts.values()]
     slits = [np.stack([b, b + notch.depth * notch.direction]) for notch in piece.notches for b in notch.base]
     for edge in () if half else piece.fold_edges:
         # A half on the fold is cut with its mirror image.
-        cutouts, slits = ([*lines, *map(_mirror(edge), lines)] for lines in (cutouts, slits))
+        cutouts, slits = ([*lines, *(mirror_image(line, edge.line) for line in lines)] for lines in (cutouts, slits))
     return Copy(
         piece=piece,
         mirrored=mirrored,
-        turned=abs(np.cos(angle) + 1) < 1e-6,
         matrix=matrix,
         cut_line=moved(piece.cut_line if half else unfold_piece(piece)),
         cutouts=tuple(map(moved, cutouts)),
@@ -406,12 +377,11 @@ def cloth_needed(garment: DraftedGarment) -> dict[str, dict[str, tuple[float | N
     shapes: dict[str, dict[str, list[shapely.Polygon]]] = {}
     for size, pieces in garment.pieces.items():
         for piece in pieces:
-            whole = shapely.Polygon(unfold_piece(piece))
-            mirrored = shapely.transform(whole, lambda points: points * [-1.0, 1.0])
+            outline = unfold_piece(piece)
+            ways = shapely.Polygon(outline), shapely.Polygon(outline * [-1.0, 1.0])
             for cloth, quantity in cloths_of(piece).items():
-                pairs = piece.piece.paired and not piece.piece.on_fold and quantity % 2 == 0
                 row = shapes.setdefault(cloth, {}).setdefault(size, [])
-                row.extend(mirrored if pairs and k % 2 else whole for k in range(quantity))
+                row.extend(ways[over] for over in turned_over(piece, quantity))
     needed: dict[str, dict[str, tuple[float | None, ...]]] = {size: {} for size in garment.pieces}
     for cloth, by_size in shapes.items():
         own = {

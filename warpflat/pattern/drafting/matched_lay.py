@@ -6,14 +6,14 @@ cell is a whole part of the repeat, so that a piece whose place is bound to the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core import BoolArray, FloatArray, InputError, nearest
+from warpflat.core import FloatArray, InputError, nearest
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
-from warpflat.pattern.drafting.tile_nesting import CELL, Mask, Places, orders
+from warpflat.pattern.drafting.tile_nesting import CELL, Mask, Places, first_free, orders, touched_cells
 
 __all__ = ["Laid", "Stripes", "lay_by_rule"]
 
@@ -39,7 +39,7 @@ class Stripes:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Laid:
-    """A copy of a piece to be laid, and its place.
+    """A copy of a piece to be laid.
 
     Attributes:
         piece: drafted.
@@ -47,7 +47,6 @@ class Laid:
         linear: 2 by 2, from the drafted piece to the directions of the cloth, warp along x.
         outline: #P by 2 [m], what is cut, in the drafted piece.
         at_fold: whether it lies against the fold of the cloth, along y = 0.
-        shift: where the drafted piece's origin lies on the cloth [m].
     """
 
     piece: DraftedPiece
@@ -55,70 +54,24 @@ class Laid:
     linear: FloatArray
     outline: FloatArray
     at_fold: bool = False
-    shift: tuple[float, float] = (0.0, 0.0)
 
 
 def lay_by_rule(
     copies: Sequence[Laid], width: float, gap: float, stripes: Stripes, garment: DraftedGarment
-) -> list[Laid]:
-    """Return copies with their places on cloth of a usable width [m], a gap [m] apart; the shortest of some orders.
+) -> list[FloatArray]:
+    """Return where the drafted pieces' origins lie on cloth of a usable width [m], a gap [m] apart; the shortest of some orders.
 
     Raises:
         InputError: a seam to be matched does not exist, or a piece is too wide.
     """
-    import shapely
-
     repeat = stripes.repeat
     cell = np.where(repeat > 0.0, repeat / np.maximum(1, np.ceil(repeat / CELL)), CELL)
-    # For each copy where its origin lies in the repeat [m]; not a number where it is not bound.
-    known = {seam.name: seam for seam in garment.garment.seams}
-    points: dict[str, list[tuple[int, FloatArray]]] = {}
-    for name in stripes.seams:
-        if name not in known:
-            raise InputError(f"match: no seam {name!r}; {nearest(name, known)}")
-        for side in (row[0] for row in known[name].sides):
-            for k, copy in enumerate(copies):
-                if copy.piece.name != side.piece:
-                    continue
-                notches = [notch for notch in copy.piece.notches if notch.seam == name]
-                line = copy.piece.edge(side.edge).line
-                at = min(notches, key=lambda n: n.length).at if notches else line[-1 if side.reversed else 0]
-                if all(k != other for other, _ in points.get(name, ())):
-                    points.setdefault(name, []).append((k, copy.linear @ at))
-    phases: list[FloatArray] = [np.full(2, np.nan) for _ in copies]
-    for start in range(len(copies)):
-        if np.isfinite(phases[start]).all() or all(k != start for joined in points.values() for k, _ in joined):
-            continue
-        phases[start], queue = np.zeros(2), [start]
-        while queue:
-            here = queue.pop()
-            for joined in points.values():
-                mine = next((at for k, at in joined if k == here), None)
-                if mine is None:
-                    continue
-                for k, at in joined:
-                    if not np.isfinite(phases[k]).all():
-                        phases[k] = phases[here] + mine - at
-                        queue.append(k)
+    phases = _phases(copies, _matched_points(copies, stripes.seams, garment))
     masks, lows = [], []
     for copy, phase in zip(copies, phases, strict=True):
-        outline = copy.outline @ copy.linear.T
-        low = outline.min(axis=0)
-        # A bound piece begins this far into its cell.
-        into = np.where(np.isfinite(phase) & (repeat > 0), np.mod(np.nan_to_num(phase) + low, cell), 0.5 * gap)
-        if copy.at_fold:
-            into[1] = 0.0
-        # The cells that an outline touches, grown by half of the gap; x in rows, y in columns, from the origin.
-        grown = shapely.Polygon(outline - low + into).buffer(0.5 * gap)
-        if copy.at_fold:
-            grown = grown.intersection(shapely.box(-1.0, 0.0, 100.0, 100.0))
-        high = np.array(grown.bounds[2:])
-        tall, wide = np.maximum(1, np.ceil(high / cell - 1e-9)).astype(int)
-        shapely.prepare(grown)
-        x, y = cell[0] * np.arange(tall)[:, None], cell[1] * np.arange(wide)[None, :]
-        cells: BoolArray = shapely.intersects(grown, shapely.box(x, y, x + cell[0], y + cell[1]))
-        masks.append(Mask(cells=cells, quarters=0, extent=high))
-        lows.append(low - into)
+        mask, low = _mask(copy, np.where(repeat > 0.0, phase, np.nan), cell, gap)
+        masks.append(mask)
+        lows.append(low)
     across = int(np.floor(width / cell[1]))
     for copy, mask in zip(copies, masks, strict=True):
         if mask.cells.shape[1] > across:
@@ -126,44 +79,93 @@ def lay_by_rule(
                 f"piece {copy.piece.name!r} is too wide for {1e3 * width:.0f} mm of cloth; give wider cloth, or lay it flat"
             )
     steps = np.where(repeat > 0.0, np.round(repeat / cell), 1).astype(int)
-    starts = [
-        tuple(
-            int(v)
-            for v in np.where(np.isfinite(p) & (repeat > 0), np.round((np.nan_to_num(p) + low) / cell), 0) % steps
+    # The rows and columns at which each copy may begin.
+    allowed = []
+    for copy, phase, low in zip(copies, phases, lows, strict=True):
+        bound = np.isfinite(phase) & (repeat > 0)
+        first = np.where(bound, np.round((np.nan_to_num(phase) + low) / cell), 0).astype(int) % steps
+        rows, columns = (
+            slice(int(at), None, int(step)) for at, step in zip(first, np.where(bound, steps, 1), strict=True)
         )
-        for p, low in zip(phases, lows, strict=True)
-    ]
-    bound = [np.isfinite(p) & (repeat > 0) for p in phases]
-    longest = sum(mask.cells.shape[0] + int(steps[0]) for mask in masks)
-    places, best = Places((longest, across)), None
+        allowed.append((rows, slice(0, 1) if copy.at_fold else columns))
+    places = Places((sum(mask.cells.shape[0] + int(steps[0]) for mask in masks), across))
+    best: tuple[int, dict[int, FloatArray]] | None = None
     for order in orders([[mask] for mask in masks]):
         places.clear()
-        found: dict[int, tuple[int, int]] = {}
+        length, found = 0, dict[int, FloatArray]()
         for k in order:
             free = places.free(masks[k])
-            allowed = np.zeros_like(free)
-            rows = slice(starts[k][0], None, int(steps[0])) if bound[k][0] else slice(None)
-            columns = slice(starts[k][1], None, int(steps[1])) if bound[k][1] else slice(None)
-            allowed[rows, slice(0, 1) if copies[k].at_fold else columns] = True
-            free &= allowed
-            if not free.any():
+            may = np.zeros_like(free)
+            may[allowed[k]] = free[allowed[k]]
+            if not may.any():
                 raise InputError(
                     f"piece {copies[k].piece.name!r} finds no place at which its stripes match; give wider cloth"
                 )
-            row = int(np.argmax(free.any(axis=1)))
-            found[k] = row, int(np.argmax(free[row]))
-            places.take(masks[k], *found[k])
-        length = max(row + masks[k].cells.shape[0] for k, (row, _) in found.items())
+            row, column = first_free(may)
+            places.take(masks[k], row, column)
+            length, found[k] = max(length, row + len(masks[k].cells)), np.array([row, column]) * cell - lows[k]
         if best is None or length < best[0]:
             best = length, found
     assert best is not None
-    laid = []
-    for k, copy in enumerate(copies):
-        shift = np.array(best[1][k]) * cell - lows[k]
-        laid.append(
-            Laid(
-                piece=copy.piece, mirrored=copy.mirrored, linear=copy.linear, outline=copy.outline, at_fold=copy.at_fold,
-                shift=(float(shift[0]), float(shift[1])),
-            )
-        )  # fmt: skip
-    return laid
+    return [best[1][k] for k in range(len(copies))]
+
+
+def _matched_points(
+    copies: Sequence[Laid], seams: Sequence[str], garment: DraftedGarment
+) -> list[dict[int, FloatArray]]:
+    """Return for each seam at whose place stripes meet the copies that it joins, each with that place, as the cloth is directed [m]."""
+    known = {seam.name: seam for seam in garment.garment.seams}
+    points = []
+    for name in seams:
+        if name not in known:
+            raise InputError(f"match: no seam {name!r}; {nearest(name, known)}")
+        joined: dict[int, FloatArray] = {}
+        for side in (row[0] for row in known[name].sides):
+            for k, copy in enumerate(copies):
+                if copy.piece.name == side.piece:
+                    notches = [notch for notch in copy.piece.notches if notch.seam == name]
+                    line = copy.piece.edge(side.edge).line
+                    at = min(notches, key=lambda n: n.length).at if notches else line[-1 if side.reversed else 0]
+                    joined.setdefault(k, copy.linear @ at)
+        points.append(joined)
+    return points
+
+
+def _phases(copies: Sequence[Laid], points: Sequence[Mapping[int, FloatArray]]) -> list[FloatArray]:
+    """Return for each copy where its origin lies in the repeat [m], not a number where it is not bound: the first of all joined at 0."""
+    phases: list[FloatArray] = [np.full(2, np.nan) for _ in copies]
+    for start in range(len(copies)):
+        if np.isfinite(phases[start]).all() or not any(start in joined for joined in points):
+            continue
+        phases[start], queue = np.zeros(2), [start]
+        while queue:
+            here = queue.pop()
+            for joined in (joined for joined in points if here in joined):
+                for k, at in joined.items():
+                    if not np.isfinite(phases[k]).all():
+                        phases[k] = phases[here] + joined[here] - at
+                        queue.append(k)
+    return phases
+
+
+def _mask(copy: Laid, phase: FloatArray, cell: FloatArray, gap: float) -> tuple[Mask, FloatArray]:
+    """Return the cells that a copy touches, grown by half of the gap [m], x in rows and y in columns; and where they begin in it [m].
+
+    A bound copy begins as far into its cell as its phase [m] says.
+    """
+    import shapely
+
+    outline = copy.outline @ copy.linear.T
+    low = outline.min(axis=0)
+    into = np.where(np.isfinite(phase), np.mod(np.nan_to_num(phase) + low, cell), 0.5 * gap)
+    if copy.at_fold:
+        into[1] = 0.0
+    grown = shapely.Polygon(outline - low + into).buffer(0.5 * gap)
+    if copy.at_fold:
+        grown = grown.intersection(shapely.box(-1.0, 0.0, 100.0, 100.0))
+    high = np.array(grown.bounds[2:])
+    tall, wide = np.maximum(1, np.ceil(high / cell - 1e-9)).astype(int)
+    # Rows run downwards there.
+    turned = shapely.transform(grown, lambda points: points[:, ::-1] * [1.0, -1.0])
+    cells = touched_cells(turned, np.zeros(2), cell[::-1], (int(tall), int(wide)))
+    return Mask(cells=cells, quarters=0, extent=high), low - into

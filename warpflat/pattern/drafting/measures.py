@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 from math import ceil
+from typing import Literal, get_args
 
 from warpflat.pattern.drafting.words import translate
 
-__all__ = ["UNITS", "cloth_words", "length_words", "name_in_units"]
+__all__ = ["INCH", "UNITS", "Units", "cloth_words", "length_words", "name_in_units"]
 
 #: Units of a pattern's words.
-UNITS = ("mm", "cm", "in")
+Units = Literal["mm", "cm", "in"]
+UNITS = get_args(Units)
 INCH = 0.0254
 YARD = 0.9144
 #: A length is written as a fraction of an inch if that is as near as this [m].

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 
-from warpflat.core import FloatArray, arc_lengths, points_at_lengths
+from warpflat.core import FloatArray, arc_lengths, points_at_lengths, unit
 from warpflat.pattern.drafting.allowance import CutOutline
 from warpflat.pattern.drafting.drafted import DraftedPiece, Notch, SeamReport
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
-from warpflat.pattern.drafting.seam_difference import eased_length, worst_difference
+from warpflat.pattern.drafting.seam_difference import (
+    LOCAL_TOLERANCE,
+    eased_length,
+    lengths_along_side,
+    worst_difference,
+)
 from warpflat.pattern.drafting.sides import Wedge
 
 __all__ = [
@@ -34,8 +39,8 @@ SHORTEST, SPACING = 0.080, 0.200
 DOUBLE_SPACING = 0.008
 #: Least distance [m] of a notch from a joint of edges, in which it would be lost.
 CLEAR = 0.012
-#: Notches meet that are no farther apart than this [m].
-MEET = 2e-4
+#: Notches meet that are no farther apart than the sides of their seam may be [m].
+MEET = LOCAL_TOLERANCE
 #: Where a side cannot be notched, the notch is tried at these shares of its distance from the seam's start.
 SHARES_FROM_START = (1.0, 0.5, 0.25)
 
@@ -196,16 +201,9 @@ def copied_together(seams: Sequence[Seam]) -> dict[str, str]:
 def cut_darts(pieces: Mapping[str, DraftedPiece]) -> list[Seam]:
     """Return the darts that are cut away as seams that close them, both legs from the border to the tip."""
     return [
-        Seam(
-            name=f"{name}.{dart.dart.name}",
-            sides=(
-                (SeamSide(piece=name, edge=dart.dart.left),),
-                (SeamSide(piece=name, edge=dart.dart.right, reversed=True),),
-            ),
-            double=False,
-        )
-        for name, piece in pieces.items()
-        for dart in piece.darts
+        seam
+        for piece in pieces.values()
+        for dart, seam in zip(piece.darts, piece.piece.dart_seams, strict=True)
         if dart.fold is None and piece.edge(dart.dart.left).width > 0
     ]
 
@@ -223,12 +221,16 @@ def dart_notches(piece: Piece, wedges: Mapping[str, Wedge], cut: CutOutline) -> 
             base = _point_on_cut_line(mouth, inwards, 0.05, cut.points)
             if base is None:
                 continue
-            width = float(np.linalg.norm(base - mouth))
-            depth = min(DEPTH, MOST_OF_ALLOWANCE * width) if width > 1e-4 else RAW_DEPTH
+            depth = _depth(float(np.linalg.norm(base - mouth)))
             notches.append(
                 Notch(seam=dart.name, edge=name, length=0.0, at=mouth, base=(base,), direction=inwards, depth=depth)
             )
     return tuple(notches)
+
+
+def _depth(width: float) -> float:
+    """Return the depth of a notch in an allowance of a width [m]."""
+    return min(DEPTH, MOST_OF_ALLOWANCE * width) if width > 1e-4 else RAW_DEPTH
 
 
 def _point_on_cut_line(at: FloatArray, inwards: FloatArray, width: float, cut_line: FloatArray) -> FloatArray | None:
@@ -254,8 +256,7 @@ class SeamLine:
         self.pieces = [pieces[s.piece] for s in side]
         self.edges = [piece.edge(s.edge) for piece, s in zip(self.pieces, side, strict=True)]
         self.lines = [edge.line[::-1] if s.reversed else edge.line for edge, s in zip(self.edges, side, strict=True)]
-        self.arcs = [arc_lengths(line) for line in self.lines]
-        self.joints = np.concatenate([[0.0], np.cumsum([arc[-1] for arc in self.arcs])])
+        self.joints = np.concatenate([[0.0], np.cumsum([edge.length for edge in self.edges])])
 
     @property
     def length(self) -> float:
@@ -265,19 +266,15 @@ class SeamLine:
     @property
     def places(self) -> FloatArray:
         """Length [m] along the side of each point of its edges as they came in, joints once."""
-        return self._joined([edge.places for edge in self.edges])
+        return self._joined(edge.places for edge in self.edges)
 
     @property
     def laid(self) -> FloatArray:
         """Length [m] along the side of each point of its edges in the layout, joints once."""
-        return self._joined([arc_lengths(edge.edge.points) for edge in self.edges])
+        return self._joined(arc_lengths(edge.edge.points) for edge in self.edges)
 
-    def _joined(self, lengths: Sequence[FloatArray]) -> FloatArray:
-        """Return lengths [m] along the edges, each in its piece's direction, as lengths along the side."""
-        rows = [np.zeros(1)]
-        for along, side in zip(lengths, self.side, strict=True):
-            rows.append(rows[-1][-1] + (along[-1] - along[::-1] if side.reversed else along)[1:])
-        return np.concatenate(rows)
+    def _joined(self, lengths: Iterable[FloatArray]) -> FloatArray:
+        return lengths_along_side(zip(lengths, (side.reversed for side in self.side), strict=True))
 
     def index(self, length: float) -> int:
         """Return the edge at a length [m]."""
@@ -332,18 +329,14 @@ class SeamLine:
         base = tuple(point for point in found if point is not None)
         if len(base) < len(offsets):
             return None
-        depth = min(DEPTH, MOST_OF_ALLOWANCE * edge.width) if edge.width > 0 else RAW_DEPTH
+        depth = _depth(edge.width)
         return Notch(seam=seam, edge=edge.name, length=length, at=at, base=base, direction=direction, depth=depth)
 
     def frame(self, index: int, length: float) -> tuple[FloatArray, FloatArray]:
         """Return the point on the sewing line at a length [m], and the unit normal into the piece."""
-        line, arc = self.lines[index], self.arcs[index]
-        length = float(np.clip(length, 0.0, arc[-1]))
-        step = int(np.clip(np.searchsorted(arc, length) - 1, 0, len(line) - 2))
-        span = float(arc[step + 1] - arc[step])
-        at = line[step] + (line[step + 1] - line[step]) * ((length - arc[step]) / span if span > 0 else 0.0)
+        length = float(np.clip(length, 0.0, self.edges[index].length))
         # The direction is taken over a few millimetres: single short chords jitter.
-        near, far = points_at_lengths(line, [length - 2e-3, length + 2e-3])
-        tangent = (far - near) / max(float(np.linalg.norm(far - near)), 1e-12)
+        near, at, far = points_at_lengths(self.lines[index], [length - 2e-3, length, length + 2e-3])
+        tangent = unit(far - near)
         inwards = np.array([-tangent[1], tangent[0]])
         return at, -inwards if self.side[index].reversed else inwards

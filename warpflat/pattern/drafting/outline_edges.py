@@ -8,16 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core import FARTHEST, FloatArray, InputError
+from warpflat.core import FARTHEST, FloatArray, InputError, unit
 from warpflat.pattern.drafting.corners import find_corners
+from warpflat.pattern.drafting.curves import CHORD
 from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT, MOST_ALLOWANCE, Dart, Edge
+from warpflat.pattern.drafting.polygons import half_plane, mirror_image, signed_area, turn_between
 
 __all__ = ["boundary_edges", "chain_edges", "find_darts", "inset", "split_outline", "with_drawn_allowances"]
 
 # Ends that are closer than this are one corner [m].
 _SAME = 5e-4
-# An outline of more points is made simpler: what lies within this [m] of its curve is left out.
-_MOST_POINTS, _FLAT = 5000, 2e-5
+# An outline of more points is made simpler: what lies as near to its curve as a chord may is left out.
+_MOST_POINTS = 5000
 
 
 def chain_edges(parts: Sequence[tuple[str, str, FloatArray]], where: str) -> list[Edge]:
@@ -49,7 +51,7 @@ def chain_edges(parts: Sequence[tuple[str, str, FloatArray]], where: str) -> lis
     if gap > _SAME:
         raise InputError(f"{where}: the outline is open by {1e3 * gap:.1f} mm; its edges must close")
     ring = np.concatenate([points[:-1] for _, _, points in chain])
-    if _area(ring) < 0.0:
+    if signed_area(ring) < 0.0:
         chain = [(name, kind, points[::-1]) for name, kind, points in chain[::-1]]
     joined = [(name, kind, points.copy()) for name, kind, points in chain]
     for before, after in zip(joined, [*joined[1:], joined[0]], strict=True):
@@ -73,12 +75,12 @@ def split_outline(ring: FloatArray, corners: FloatArray | None = None, fold: Flo
     if len(ring) > _MOST_POINTS:
         import shapely
 
-        ring = np.asarray(shapely.LineString(ring).simplify(_FLAT, preserve_topology=False).coords)
+        ring = np.asarray(shapely.LineString(ring).simplify(CHORD, preserve_topology=False).coords)
         if len(ring) > _MOST_POINTS:
             raise InputError(
                 f"an outline has {len(ring):,} points that do not lie in its curves, {_MOST_POINTS:,} are the most; smooth it"
             )
-    if _area(ring) < 0.0:
+    if signed_area(ring) < 0.0:
         ring = ring[::-1]
     if corners is not None and len(corners) > 1:
         places = {int(np.linalg.norm(ring - corner, axis=1).argmin()) for corner in corners}
@@ -111,7 +113,7 @@ def _along_fold(ring: FloatArray, fold: FloatArray) -> tuple[int, int] | None:
 
     None where the closed line runs nowhere along it, or lies on both sides of it: then it is whole.
     """
-    direction = (fold[1] - fold[0]) / np.linalg.norm(fold[1] - fold[0])
+    direction = unit(fold[1] - fold[0])
     away, along = (ring - fold[0]) @ np.array([direction[1], -direction[0]]), ring @ direction
     if min(away.max(), -away.min()) > FOLD_STRAIGHT:
         return None
@@ -186,11 +188,12 @@ def inset(ring: FloatArray, allowance: float, where: str, fold: FloatArray | Non
     stretch = None if fold is None else _along_fold(ring, fold)
     if stretch is not None and fold is not None:
         # The half and its mirror image are drawn in together; half of what is left is that of the piece.
-        whole = whole.union(shapely.Polygon(_mirrored(ring, fold))).buffer(FOLD_STRAIGHT, join_style="mitre")
+        whole = whole.union(shapely.Polygon(mirror_image(ring, fold))).buffer(FOLD_STRAIGHT, join_style="mitre")
         whole = whole.buffer(-FOLD_STRAIGHT, join_style="mitre")
     inner = whole.buffer(-allowance, join_style="mitre", mitre_limit=5.0)
     if stretch is not None and fold is not None:
-        inner = inner.intersection(_beside(fold, ring.mean(axis=0)))
+        ends = fold if turn_between(fold[1] - fold[0], ring.mean(axis=0) - fold[0]) > 0.0 else fold[::-1]
+        inner = inner.intersection(half_plane(ends[0], ends[1], FARTHEST))
     if inner.is_empty or inner.geom_type != "Polygon":
         raise InputError(f"{where}: is too narrow for an allowance of {1e3 * allowance:g} mm")
     return np.asarray(inner.exterior.coords)[:-1]
@@ -209,25 +212,3 @@ def with_drawn_allowances(edges: Sequence[Edge], cutting: Sequence[FloatArray]) 
         wide = round(float(np.median(shapely.distance(points, drawn))), 4) if cutting else 0.0
         found.append(edge if edge.kind in ("fold", "dart") or wide > MOST_ALLOWANCE else replace(edge, allowance=wide))
     return found
-
-
-def _mirrored(points: FloatArray, line: FloatArray) -> FloatArray:
-    """Return points (#P by 2 [m]) mirrored at a straight line (2 by 2 [m])."""
-    x, y = (line[1] - line[0]) / np.linalg.norm(line[1] - line[0])
-    return np.asarray((points - line[0]) @ np.array([[x * x - y * y, 2 * x * y], [2 * x * y, y * y - x * x]]) + line[0])
-
-
-def _beside(line: FloatArray, side: FloatArray) -> Any:
-    """Return the half of the plane, as far as a pattern reaches, on that side of a straight line (2 by 2 [m]) where a point lies."""
-    import shapely
-
-    far = FARTHEST * (line[1] - line[0]) / np.linalg.norm(line[1] - line[0])
-    across = np.array([far[1], -far[0]])
-    across *= 1.0 if float((side - line[0]) @ across) > 0.0 else -1.0
-    a, b = line[0] - far, line[0] + far
-    return shapely.Polygon([a, b, b + across, a + across])
-
-
-def _area(ring: FloatArray) -> float:
-    x, y = ring.T
-    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))

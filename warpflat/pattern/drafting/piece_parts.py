@@ -68,10 +68,7 @@ class Edge:
         points = check_points(self.points, f"edge {self.name!r}", at_least=2)
         if polyline_length(points) < SAME_POINT:
             raise InputError(f"edge {self.name!r} has no length; an edge runs between two different corners")
-        if self.allowance is not None and not 0 <= self.allowance <= MOST_ALLOWANCE:
-            raise InputError(
-                f"edge {self.name!r}: allowance {self.allowance!r} m; it must be between 0 and {MOST_ALLOWANCE:g} m"
-            )
+        _check_allowance(f"edge {self.name!r}", self.allowance)
         if self.kind == "fold" and self.allowance:
             raise InputError(f"edge {self.name!r} lies on the fold: its allowance must be 0, not {self.allowance!r} m")
         object.__setattr__(self, "points", points)
@@ -135,8 +132,7 @@ class Hole:
             raise InputError(
                 f"hole {self.name!r}: unknown kind {self.kind!r}; {nearest(self.kind, ('cutout', 'dart'))}"
             )
-        if self.allowance is not None and not 0 <= self.allowance <= 0.5:
-            raise InputError(f"hole {self.name!r}: allowance {self.allowance!r} m; it must be between 0 and 0.5 m")
+        _check_allowance(f"hole {self.name!r}", self.allowance)
         points = check_points(self.points, f"hole {self.name!r}", at_least=3)
         if np.linalg.norm(points[0] - points[-1]) < SAME_POINT:
             points = points[:-1]
@@ -148,6 +144,11 @@ class Hole:
         if self.kind == "dart":
             return 0.0
         return DEFAULT_ALLOWANCE["seam"] if self.allowance is None else float(self.allowance)
+
+
+def _check_allowance(where: str, allowance: float | None) -> None:
+    if allowance is not None and not 0 <= allowance <= MOST_ALLOWANCE:
+        raise InputError(f"{where}: allowance {allowance!r} m; it must be between 0 and {MOST_ALLOWANCE:g} m")
 
 
 def check_points(points: ArrayLike, where: str, *, at_least: int) -> FloatArray:

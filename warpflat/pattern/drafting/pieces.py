@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -17,18 +17,15 @@ from warpflat.pattern.drafting.seam_difference import eased_length
 from warpflat.pattern.drafting.words import translate_name
 from warpflat.pattern.drafting.worn import Worn
 
-if TYPE_CHECKING:
-    pass
-
-__all__ = ["Elastic", "Pattern", "Piece", "Seam", "SeamSide", "check_hole", "unknown_size"]
+__all__ = ["Elastic", "OpeningKind", "Pattern", "Piece", "Role", "Seam", "SeamSide", "check_hole", "unknown_size"]
 
 
 #: Kinds of :class:`SeamOpening`.
-OPENINGS = ("zip", "buttons", "slit", "vent")
-ROLES = (
-    *("shell", "facing", "strip", "waistband", "cuff", "collar", "hood", "lining", "interfacing", "pocket"),
-    *("placket", "tie", "fly"),
-)
+OpeningKind = Literal["zip", "buttons", "slit", "vent"]
+#: What a piece is, or is derived as.
+Role = Literal[
+    "shell", "facing", "strip", "waistband", "cuff", "collar", "hood", "lining", "interfacing", "pocket", "placket", "tie", "fly"
+]  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,7 +42,7 @@ class Piece:
         grain: 2 by 2 [m], from and to, upwards along the warp; None takes the y axis through the middle.
         holes: cutouts and fish-eye darts.
         marks: points [m] by name that are marked through the cloth: buttons, corners of pockets.
-        role: "shell", or what it is derived as: one of `ROLES`.
+        role: "shell", or what it is derived as: one of `Role`.
         also: cloths from which it is cut too, and how often, as interfacing.
         paired: False where all copies are cut the same way up, not left and right.
         title: what is printed instead of the name, in any language; the name with spaces if not given.
@@ -83,8 +80,8 @@ class Piece:
             check_label(self.title, "a piece's printed name")
         if self.units not in UNITS:
             raise InputError(f"{where}: unknown units {self.units!r}; {nearest(self.units, UNITS)}")
-        if self.role not in ROLES:
-            raise InputError(f"{where}: unknown role {self.role!r}; {nearest(self.role, ROLES)}")
+        if self.role not in get_args(Role):
+            raise InputError(f"{where}: unknown role {self.role!r}; {nearest(self.role, get_args(Role))}")
         if min(self.quantity, *self.also.values(), self.quantity) < 1:
             raise InputError(f"{where}: quantity is {self.quantity}; it must be at least 1")
         object.__setattr__(self, "edges", tuple(self.edges))
@@ -119,6 +116,21 @@ class Piece:
     def outline(self) -> FloatArray:
         """Outline along all edges, dart legs included (#P by 2 [m]), closed, first point not repeated."""
         return np.concatenate([edge.points[:-1] for edge in self.edges])
+
+    @property
+    def dart_seams(self) -> tuple[Seam, ...]:
+        """The darts as seams "PIECE.DART" that close them, both legs from the border to the tip."""
+        return tuple(
+            Seam(
+                name=f"{self.name}.{dart.name}",
+                sides=(
+                    (SeamSide(piece=self.name, edge=dart.left),),
+                    (SeamSide(piece=self.name, edge=dart.right, reversed=True),),
+                ),
+                double=False,
+            )
+            for dart in self.darts
+        )
 
     def edge(self, name: str) -> Edge:
         """Return the edge of that name.
@@ -183,8 +195,8 @@ class SeamOpening:
     style: str = ""
 
     def __post_init__(self) -> None:
-        if self.kind not in OPENINGS:
-            raise InputError(f"unknown kind of opening {self.kind!r}; {nearest(self.kind, OPENINGS)}")
+        if self.kind not in get_args(OpeningKind):
+            raise InputError(f"unknown kind of opening {self.kind!r}; {nearest(self.kind, get_args(OpeningKind))}")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, points_at_lengths, polyline_length
-from warpflat.pattern.drafting.label import LEADING, TEXT, TITLE, Label, label_lines, rotation, text_width, wrap_text
-from warpflat.pattern.drafting.pieces import Piece
+from warpflat.core import FloatArray, points_at_lengths, polyline_length, unit
+from warpflat.pattern.drafting.drafted import DraftedPiece
+from warpflat.pattern.drafting.label import LEADING, TEXT, TITLE, Label, box_around, label_lines, text_width, wrap_text
+from warpflat.pattern.drafting.polygons import rotation
 from warpflat.pattern.drafting.words import translate
 
 if TYPE_CHECKING:
@@ -43,7 +44,6 @@ _GAP = 0.04
 _AT_LINE = 0.09
 # Lines this steep, or steeper, are read upwards: the part of their direction that goes to the right.
 _STEEP = 0.2
-_CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 #: Distances [m] of labels from the sewing line and holes, from other lines, and from a fold, whose bracket and arrows
 #: are 16 mm wide; the second row holds where there is little room.
@@ -191,7 +191,7 @@ def _boxes(spots: Sequence[Spot], width: float, height: float) -> FloatArray:
     """Return the polygons (#S) that a text of this size covers at each spot."""
     import shapely
 
-    return np.asarray(shapely.polygons(placed_points(spots, *(_CORNERS * (0.5 * width, 0.5 * height)).T)))
+    return np.asarray(shapely.polygons(placed_points(spots, *box_around(np.zeros(2), width, height).T)))
 
 
 def in_batches(spots: Iterable[Spot]) -> Iterator[list[Spot]]:
@@ -253,7 +253,7 @@ def spots_along(
         centre = min(max(share * total, 0.52 * width), total - 0.52 * width)
         stretch = points_at_lengths(line, centre + np.linspace(-0.5, 0.5, 9) * width)
         before, after = stretch[[0, -1]]
-        along = (after - before) / max(float(np.linalg.norm(after - before)), 1e-12)
+        along = unit(after - before)
         backwards = along[0] < -_STEEP or (abs(along[0]) <= _STEEP and along[1] < 0)
         along = -along if backwards else along
         above = np.array([-along[1], along[0]])
@@ -302,34 +302,31 @@ def spots_beside(
                 yield Spot(x=x, y=y, angle=0.0, leader=None if touches else point)
 
 
-def place_label(
-    piece: Piece,
-    garment: str,
-    lines: tuple[FloatArray, FloatArray],
-    holes: Sequence[FloatArray],
-    obstacles: Sequence[FloatArray],
-    folds: Sequence[FloatArray],
-) -> Label:
+def place_label(piece: DraftedPiece, garment: str, joints: Sequence[FloatArray]) -> Label:
     """Place the label on the widest free place of a piece, smaller if need be, or beside the piece.
+
+    It keeps off holes, and crosses no line of the piece.
 
     Args:
         piece: whose label it is.
         garment: its name.
-        lines: #P by 2 [m], the sewing line and the cutting line.
-        holes: #P by 2 [m], the sewing lines of holes and the borders of fish-eye darts, which the label avoids.
-        obstacles: #P by 2 [m], lines that it does not cross.
-        folds: #P by 2 [m], the edges on the fold, beside which a bracket stands.
+        joints: #P by 2 [m], of two sheets, which it does not cross either.
     """
     import shapely
 
-    sew, cut = (shapely.Polygon(line) for line in lines)
+    sew, cut = shapely.Polygon(piece.sew_line), shapely.Polygon(piece.cut_line)
+    holes = [*(cutout.sew_line for cutout in piece.cutouts.values()), *piece.fisheyes.values()]
+    legs = [piece.edge(leg).line for dart in piece.darts for leg in (dart.dart.left, dart.dart.right)]
+    obstacles = [piece.grain, *piece.internal_lines.values(), *legs, *joints]
     away = [shapely.Polygon(hole).buffer(0) for hole in holes]
-    texts = tuple((text, TITLE if k == 0 else TEXT) for k, text in enumerate(label_lines(piece, garment)))
+    # What it says of allowances is what is drawn.
+    widened = replace(piece.piece, edges=[replace(edge.edge, allowance=edge.width) for edge in piece.edges])
+    texts = tuple((text, TITLE if k == 0 else TEXT) for k, text in enumerate(label_lines(widened, garment)))
     found: list[Label] = []
     for border, line, fold in CLEARANCES:
         keep_off = [hole.buffer(border) for hole in away]
         keep_off += [shapely.LineString(obstacle).buffer(line) for obstacle in obstacles]
-        keep_off += [shapely.LineString(edge).buffer(fold) for edge in folds]
+        keep_off += [shapely.LineString(edge.line).buffer(fold) for edge in piece.fold_edges]
         label = fit_label(sew.buffer(-border).difference(shapely.union_all(keep_off)), texts)
         found += [] if label is None else [label]
         if label is not None and _relative_size(label) >= ENOUGH:
@@ -380,8 +377,7 @@ def fit_label(area: Geometry, lines: Sequence[tuple[str, float]], *, least: floa
         for row in label.words():
             # A blank row takes the room of a letter.
             wide = max(text_width(row.text, row.height, bold=row.bold), row.height)
-            half = np.array([wide, row.height * LEADING]) / 2
-            corners.append(row.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]])
+            corners.append(box_around(row.at, wide, row.height * LEADING))
         shape = np.asarray(shapely.MultiPoint(np.concatenate(corners)).convex_hull.exterior.coords)
         # Places are made when they are first asked for.
         places, from_first = tee(places)

@@ -1,4 +1,4 @@
-"""Polygons in the plane: Boolean operations snapped to a grid, mirror images, and the vectors that they need."""
+"""Polygons in the plane: Boolean operations snapped to a grid, mirror images and half planes, and the vectors that they need."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray
+from warpflat.core import FloatArray, reflected, unit
 
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon
@@ -21,12 +21,18 @@ __all__ = [
     "difference",
     "half_plane",
     "intersection",
+    "mapped",
+    "mirror_image",
+    "normal_towards",
     "parallelogram",
     "polygons_only",
     "reflect",
-    "rotate",
+    "rotation",
+    "signed_area",
+    "turn_between",
     "union",
     "unit_vector",
+    "upright",
 ]
 
 
@@ -101,24 +107,40 @@ def parallelogram(
 def reflect(area: Geometry, point: FloatArray, direction: FloatArray) -> Geometry:
     """Mirror an area on the line through `point` along the unit vector `direction`."""
     import shapely
-    from shapely.affinity import affine_transform
 
-    x, y = float(direction[0]), float(direction[1])
-    matrix = np.array([[2 * x * x - 1, 2 * x * y], [2 * x * y, 2 * y * y - 1]])
-    shift = point - matrix @ point
-    return shapely.set_precision(affine_transform(area, [*matrix.reshape(-1).tolist(), *shift.tolist()]), GRID)
+    line = np.stack([point, point + direction])
+    return shapely.set_precision(shapely.transform(area, lambda points: mirror_image(points, line)), GRID)
 
 
-def half_plane(start: FloatArray, end: FloatArray, body: Polygon) -> Polygon:
-    """Return the side of a fold on which the piece lies, large enough for the piece and its allowances."""
-    import shapely
+def mirror_image(points: FloatArray, line: FloatArray) -> FloatArray:
+    """Return points (#P by 2 [m]) mirrored at the straight line from the first to the last point of a line (#L by 2 [m])."""
+    x, y = unit_vector(line[-1] - line[0])
+    normal = np.array([-y, x])
+    return reflected(points, normal, float(normal @ line[0]))
 
+
+def mapped(points: FloatArray, matrix: FloatArray) -> FloatArray:
+    """Return points (... by 2) under a 2 by 3 matrix: turned by its first two columns and shifted by the last."""
+    return np.asarray(points @ matrix[:, :2].T + matrix[:, 2])
+
+
+def half_plane(start: FloatArray, end: FloatArray, reach: float) -> Polygon:
+    """Return the half of the plane to the left of the line from one point to another, as far as `reach` [m]."""
     direction = unit_vector(end - start)
-    inwards = np.array([-direction[1], direction[0]])
-    x0, y0, x1, y1 = body.bounds
-    size = 2 * (x1 - x0 + y1 - y0) + 2.0
-    a, b = start - size * direction, start + size * direction
-    return shapely.Polygon([a, b, b + size * inwards, a + size * inwards])
+    left = np.array([-direction[1], direction[0]])
+    return parallelogram(start, direction, (-reach, reach), left, (0.0, reach))
+
+
+def signed_area(ring: FloatArray) -> float:
+    """Return the area [m2] of a closed line (#P by 2 [m], the first point not repeated), negative where it runs clockwise."""
+    x, y = ring.T
+    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+def normal_towards(direction: FloatArray, other: FloatArray) -> FloatArray:
+    """Return the normal of a vector, as long as it, on the side to which another one points."""
+    left = np.array([-direction[1], direction[0]])
+    return left if left @ other > 0 else -left
 
 
 def angle_between(a: FloatArray, b: FloatArray) -> float:
@@ -126,10 +148,21 @@ def angle_between(a: FloatArray, b: FloatArray) -> float:
     return float(np.arccos(np.clip(a @ b, -1.0, 1.0)))
 
 
-def rotate(vector: FloatArray, angle: float) -> FloatArray:
-    """Rotate a vector counter-clockwise by `angle` [rad]."""
+def turn_between(a: FloatArray, b: FloatArray) -> float:
+    """Return the angle [rad] by which a vector turns to another one, to the left positive."""
+    return float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
+
+
+def rotation(angle: float) -> FloatArray:
+    """Return the 2 by 2 matrix of a turn by an angle [rad], counter-clockwise."""
     cosine, sine = np.cos(angle), np.sin(angle)
-    return np.array([cosine * vector[0] - sine * vector[1], sine * vector[0] + cosine * vector[1]])
+    return np.array([[cosine, -sine], [sine, cosine]])
+
+
+def upright(direction: FloatArray) -> FloatArray:
+    """Return the 2 by 2 matrix that turns a direction upwards."""
+    x, y = unit(direction)
+    return np.array([[y, -x], [x, y]])
 
 
 def unit_vector(vector: FloatArray) -> FloatArray:

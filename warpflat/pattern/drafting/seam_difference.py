@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
 from warpflat.core import FloatArray
 
-__all__ = ["LOCAL_TOLERANCE", "SEAM_TOLERANCE", "STRETCH", "eased_length", "worst_difference"]
+__all__ = ["LOCAL_TOLERANCE", "SEAM_TOLERANCE", "STRETCH", "eased_length", "lengths_along_side", "worst_difference"]
 
 
 #: Sides of a seam may differ by this [m], and by this over any stretch of `STRETCH` [m].
@@ -57,3 +58,15 @@ def worst_difference(
     stretch = np.interp(ends, first, second) - np.interp(starts, first, second)
     meant = eased_length(ends, first[-1], ease, eased) - eased_length(starts, first[-1], ease, eased)
     return float(np.abs(stretch - meant).max())
+
+
+def lengths_along_side(edges: Iterable[tuple[FloatArray, bool]]) -> FloatArray:
+    """Return lengths [m] along the edges of a seam's side as lengths along the side, joints once.
+
+    Args:
+        edges: the lengths along each, from 0 to all of it, and whether the seam runs against it.
+    """
+    rows = [np.zeros(1)]
+    for along, is_reversed in edges:
+        rows.append(rows[-1][-1] + (along[-1] - along[::-1] if is_reversed else along)[1:])
+    return np.concatenate(rows)

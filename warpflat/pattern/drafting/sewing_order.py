@@ -12,7 +12,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
-from string import ascii_uppercase
 from typing import Any
 
 import numpy as np
@@ -20,9 +19,10 @@ import numpy as np
 from warpflat.core import other_side, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.pieces import Seam, SeamOpening, SeamSide
+from warpflat.pattern.drafting.polygons import turn_between
 from warpflat.pattern.drafting.seam_words import joint_words
 from warpflat.pattern.drafting.sewing_tasks import GATHERED, Place, SewingTasks, Task, pieces_of, techniques
-from warpflat.pattern.drafting.words import translate, translate_name
+from warpflat.pattern.drafting.words import letters_of, translate, translate_name
 
 __all__ = [
     "SewingStep",
@@ -272,8 +272,7 @@ class _Workshop(SewingTasks):
         for piece, _, _, at in (first, second, third):
             edges = self.pieces[piece].edges
             before, after = edges[at - 1].points, edges[at].points
-            (x, y), (u, v) = before[-1] - before[-2], after[1] - after[0]
-            angles.append(180.0 - np.degrees(np.arctan2(x * v - y * u, x * u + y * v)))
+            angles.append(180.0 - np.degrees(turn_between(before[-1] - before[-2], after[1] - after[0])))
         apart = abs(angles[0] - angles[1])
         return bool(apart + 10.0 < min(abs(angles[2] - angles[0]), abs(angles[2] - angles[1])))
 
@@ -391,9 +390,8 @@ class _Workshop(SewingTasks):
             share = seam.ease if seam.ease > 0 else 1.0 / (1.0 + seam.ease) - 1.0
             band = pieces[seam.sides[0 if seam.ease > 0 else 1][0].piece].role == "strip"
             held = "stretch" if band else "gather" if share > GATHERED else "ease in"
-        letter = (
-            _letter(len(set(self.letters.values()))) if task.like is None else self.letters[task.like.seams[0].name]
-        )
+        new = letters_of(len(set(self.letters.values())))
+        letter = new if task.like is None else self.letters[task.like.seams[0].name]
         self.letters |= {each.name: letter for each in group}
         # Seams called by their pieces have numbers from the second on; those of facings, and of equal pieces between others, are said
         # by theirs, too.
@@ -430,13 +428,3 @@ class _Workshop(SewingTasks):
             titles = dict.fromkeys(self.titles[part.piece] for part in row)
             found.setdefault(frozenset(titles), " + ".join(titles))
         return ", ".join(found.values())
-
-
-def _letter(number: int) -> str:
-    """Return A, B, ... Z, AA, AB, ..."""
-    letters = ""
-    number += 1
-    while number:
-        number, digit = divmod(number - 1, 26)
-        letters = ascii_uppercase[digit] + letters
-    return letters

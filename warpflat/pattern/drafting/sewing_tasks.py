@@ -12,7 +12,7 @@ from typing import Any
 from warpflat.core import line_name, other_side, polyline_length, read_toml, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.measures import length_words
-from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
+from warpflat.pattern.drafting.pieces import Elastic, Piece, Seam, SeamSide
 from warpflat.pattern.drafting.words import listed, translate, translate_name
 
 __all__ = ["GATHERED", "Place", "SewingTasks", "Task", "is_flounce", "piece_titles", "pieces_of", "techniques"]
@@ -111,7 +111,7 @@ class SewingTasks:
             if self.stands_for_both(task.seams):
                 seam = replace(task.seams[0], name=name, openings=())
                 self.tasks.append(Task(technique=self._technique([seam]), seams=[seam], like=task))
-        self._finish(garment)
+        self._finish(garment.garment.elastics)
 
     def stands_for_both(self, group: Sequence[Seam]) -> bool:
         """Return whether a seam of halves on the fold, or of pairs, is sewn on both sides of the body."""
@@ -239,164 +239,175 @@ class SewingTasks:
             if (piece, edge) not in taken and line_name(edge) in along
         ]
 
-    def _finish(self, garment: DraftedGarment) -> None:
+    def _take(self, places: Iterable[Place]) -> list[Place]:
+        """Return those of some places that are free, which they are no more."""
+        return [place for place in places if self._free.pop(place, None) is not None]
+
+    def _take_of(self, names: Collection[str], kinds: Collection[str] = ("seam", "hem", "cut")) -> list[Place]:
+        """Return the free edges of some pieces and kinds, which they are no more."""
+        return self._take([place for place, kind in self._free.items() if place[0] in names and kind in kinds])
+
+    def _add(self, technique: str, pieces: Iterable[str], uses: Sequence[Place] = (), **values: Any) -> None:
+        """Add a task, if there is anything to do."""
+        names = list(pieces)
+        if names or uses:
+            self.tasks.append(Task(technique=technique, pieces=names, uses=list(uses), values=values))
+
+    def _with_role(self, *roles: str) -> list[str]:
+        return [name for name, piece in self.pieces.items() if piece.role in roles]
+
+    def _has_kind(self, name: str, kind: str) -> bool:
+        return any(edge.kind == kind for edge in self.pieces[name].edges)
+
+    def _finish(self, elastics: Sequence[Elastic]) -> None:
         """Add the tasks that finish edges and pieces, until every free edge is used up by one of them."""
-        drafted, units = list(self.drafted.values()), self.units
         sewn = {side.place for seam in self.seams for side in seam.stretches}
         # What is cut twice is drawn for one side.
         sewn |= {(of, other_side(edge)) for piece, edge in sewn for of in (piece, other_side(piece))}
-        free = {
+        self._free = {
             (piece.name, edge.name): edge.kind
             for piece in self.pieces.values()
             for edge in piece.edges
             if edge.kind not in ("fold", "dart") and (piece.name, edge.name) not in sewn
         }
-        joined = {piece for piece, _ in sewn}
+        self._finish_parts({piece for piece, _ in sewn})
+        self._finish_grown_facings()
+        self._finish_inner_edges()
+        self._finish_strips()
+        for kind in ("vent", "slit"):
+            self._finish_opening(kind)
+        for elastic in elastics:
+            self._thread(elastic)
+        shell = self._with_role("shell")
+        self._add("hang", [name for name in shell if is_flounce(self.pieces[name])])
+        for technique, kind in (("hem", "hem"), ("bind_raw", "seam"), ("raw", "cut")):
+            self._add(technique, [], self._take_of(self.pieces, (kind,)))
+        self._close(list(self.drafted.values()))
 
-        def take(places: Iterable[Place]) -> list[Place]:
-            return [place for place in places if free.pop(place, None) is not None]
-
-        def of(names: Collection[str], kinds: Collection[str] = ("seam", "hem", "cut")) -> list[Place]:
-            return take([place for place, kind in free.items() if place[0] in names and kind in kinds])
-
-        def add(technique: str, pieces: Iterable[str], uses: Sequence[Place] = (), **values: Any) -> None:
-            names = list(pieces)
-            if names or uses:
-                self.tasks.append(Task(technique=technique, pieces=names, uses=list(uses), values=values))
-
-        role = {name: piece.role for name, piece in self.pieces.items()}
-        fused = [name for name, piece in self.pieces.items() if piece.also or role[name] == "interfacing"]
-        add("fuse", fused, of([name for name in fused if role[name] == "interfacing"]))
-        ties = [name for name in role if role[name] == "tie"]
-        tied = [name for name, piece in self.pieces.items() if "tie" in piece.marks]
-        add("tie", [*ties, *tied], of(ties))
-        add("tie_on", tied)
+    def _finish_parts(self, joined: Collection[str]) -> None:
+        """Add interfacings, ties, darts, pockets, straps and plackets."""
+        interfacings = self._with_role("interfacing")
+        fused = [name for name, piece in self.pieces.items() if piece.also or name in interfacings]
+        self._add("fuse", fused, self._take_of(interfacings))
+        ties, tied = self._with_role("tie"), [name for name, piece in self.pieces.items() if "tie" in piece.marks]
+        self._add("tie", [*ties, *tied], self._take_of(ties))
+        self._add("tie_on", tied)
         for technique in ("dart", "pleat"):
-            for piece in drafted:
+            for piece in self.drafted.values():
                 legs = _dart_legs(piece, pleats=technique == "pleat")
                 if legs:
-                    add(technique, [piece.name], darts=f"{self.titles[piece.name]}: {listed(list(legs))}")
+                    self._add(technique, [piece.name], darts=f"{self.titles[piece.name]}: {listed(list(legs))}")
                     self.tasks[-1].places = [(piece.name, leg) for row in legs.values() for leg in row]
         # A pocket of a first project is a panel like others, but nothing is sewn to its edges.
-        loose = [name for name in role if name not in joined]
-        pockets = [name for name in loose if role[name] == "pocket" or name.endswith("pocket")]
-        patches = [name for name in pockets if any(edge.kind == "hem" for edge in self.pieces[name].edges)]
-        add("patch_pocket", patches, of(patches))
+        loose = [name for name in self.pieces if name not in joined]
+        pockets = [name for name in loose if self.pieces[name].role == "pocket" or name.endswith("pocket")]
+        patches = [name for name in pockets if self._has_kind(name, "hem")]
+        self._add("patch_pocket", patches, self._take_of(patches))
         welts = [name for name in pockets if name not in patches]
-        add("welt_pocket", welts, of(welts))
-        bags = [name for name in joined if role.get(name) == "pocket"]
-        inseam = [place[0] for place in free if place[0] in bags and place[1] == "opening"]
-        add("inseam_bag", inseam, of(inseam, ("cut",)))
+        self._add("welt_pocket", welts, self._take_of(welts))
+        bags = [name for name in self._with_role("pocket") if name in joined]
+        inseam = [place[0] for place in self._free if place[0] in bags and place[1] == "opening"]
+        self._add("inseam_bag", inseam, self._take_of(inseam, ("cut",)))
         rims = [task for task in self.tasks if task.technique in ("pocket_rim", "inseam_rim", "pocket_opening")]
-        for place in of(bags):
+        for place in self._take_of(bags):
             next(task for task in rims if place[0] in pieces_of(task.sewn)).uses.append(place)
-        straps = [
-            name
-            for name in loose
-            if role[name] == "shell" and all(edge.kind == "cut" for edge in self.pieces[name].edges)
-        ]
-        add("strap", straps, of(straps))
-        plackets = [name for name in loose if role[name] == "placket"]
+        shell = [name for name in self._with_role("shell") if name in loose]
+        straps = [name for name in shell if all(edge.kind == "cut" for edge in self.pieces[name].edges)]
+        self._add("strap", straps, self._take_of(straps))
+        plackets = [name for name in self._with_role("placket") if name in loose]
         buttoned = [name for name in plackets if "button" in self.pieces[name].marks]
-        add("neck_placket", buttoned, of(buttoned), strip=translate(f"{self.above} strip"))
+        self._add("neck_placket", buttoned, self._take_of(buttoned), strip=translate(f"{self.above} strip"))
         slits = [name for name in plackets if name not in buttoned]
-        add("bound_slit", slits, of(slits))
-        fly = [name for name in role if role[name] == "fly"]
-        fly_places = of(fly)
+        self._add("bound_slit", slits, self._take_of(slits))
+        fly = self._with_role("fly")
+        places = self._take_of(fly)
         for task in self.tasks:
             if task.technique == "fly":
-                task.pieces, task.uses = fly, fly_places
-        # Facings that are grown on; beside a collar that ends at the centre they are sewn with that.
-        grown = [name for name in role if self._grown_on(name)]
-        ends = {name: self._free_beside_fold(name) for name in grown}
+                task.pieces, task.uses = fly, places
+
+    def _finish_grown_facings(self) -> None:
+        """Add facings that are grown on; beside a collar that ends at the centre they are sewn with that."""
         between = [task for task in self.tasks if task.technique == "collar_between"]
-        for name in grown:
-            own = [(name, edge) for edge in (*self._grown_on(name), *ends[name])]
+        for name in [name for name in self.pieces if self._grown_on(name)]:
+            own = [(name, edge) for edge in (*self._grown_on(name), *self._free_beside_fold(name))]
             faced = [each for each in self.tasks if each.technique == "facing" and set(own) & set(each.sewn)]
-            places = take([(p, e) for p, e in own if not faced or self.pieces[p].edge(e).kind != "hem"])
+            places = self._take([(p, e) for p, e in own if not faced or self.pieces[p].edge(e).kind != "hem"])
             if faced:
                 faced[0].uses += places
             elif between:
                 between[0].uses += places
                 between[0].pieces.append(name)
             else:
-                add("grown_facing", [name], places)
+                self._add("grown_facing", [name], places)
         for task in self.tasks:
             if task.technique == "collar_under_facing":
-                task.uses += take(self._turned_over(task.seams[0]))
-        # Linings and facings end at a zip, or are caught in a band or binding, where the shell's edge of the same name is.
+                task.uses += self._take(self._turned_over(task.seams[0]))
+
+    def _finish_inner_edges(self) -> None:
+        """Add where linings and facings end at a zip, or are caught in a band or binding: there the shell has an edge of the same name."""
         zipped, bound = set[str](), set[str]()
         for task in self.tasks:
-            edges = {without_side(edge) for piece, edge in task.sewn if role[piece] == "shell"}
+            edges = {without_side(edge) for piece, edge in task.sewn if self.pieces[piece].role == "shell"}
             zipped |= edges if any(opening.kind == "zip" for seam in task.seams for opening in seam.openings) else set()
             bound |= edges if task.how.get("takes_edges") and task.technique not in ("facing", "hood") else set()
-        inner = [name for name in role if role[name] in ("lining", "facing")]
+        inner = self._with_role("lining", "facing")
         for technique, known in (("at_zip", zipped), ("baste_lining", bound)):
-            places = [
-                (p, e) for (p, e), kind in free.items() if p in inner and kind == "seam" and without_side(e) in known
-            ]
-            add(technique, [], take(places))
+            free = [(p, e) for (p, e), kind in self._free.items() if p in inner and kind == "seam"]
+            self._add(technique, [], self._take([(p, e) for p, e in free if without_side(e) in known]))
         linings = [task for task in self.tasks if task.technique == "lining_join"]
         zips = [task for task in linings if any(each.kind == "zip" for each in task.seams[0].openings)]
         for task in self.tasks:
             if task.technique == "at_zip":
                 task.places = [place for each in zips for place in each.sewn]
-        # Strips, collars and facings: what their own seam to the garment leaves.
-        ruffles = [
-            name for name in role if role[name] == "strip" and any(e.kind == "hem" for e in self.pieces[name].edges)
-        ]
-        add("ruffle_hem", ruffles, of(ruffles, ("hem",)))
+
+    def _finish_strips(self) -> None:
+        """Add ruffles and hems of hoods; what their own seam to the garment leaves of strips, collars and facings goes with that."""
+        ruffles = [name for name in self._with_role("strip") if self._has_kind(name, "hem")]
+        self._add("ruffle_hem", ruffles, self._take_of(ruffles, ("hem",)))
         pleated = [name for name in ruffles if any("pleat fold" in line for line in self.pieces[name].internal_lines)]
-        add("ruffle_pleats", pleated)
+        self._add("ruffle_pleats", pleated)
         longer = {s.piece for seam in self.seams if seam.ease > GATHERED for s in seam.sides[1]}
-        add("ruffle_gathers", [name for name in ruffles if name in longer and name not in pleated])
-        hoods = [name for name in role if role[name] == "hood"]
-        hood_hems = of(hoods, ("hem",))
-        width = max((self.pieces[p].edge(e).width for p, e in hood_hems), default=0.0)
-        add("hood_hem", [], hood_hems, width=length_words(width, units))
-        for name in role:
-            if role[name] in ("facing", "strip", "waistband", "cuff", "collar", "hood"):
-                places = [(p, e) for (p, e), kind in free.items() if p == name and kind != "hem"]
-                on = [t for t in self.tasks if t.how.get("takes_edges") and name in pieces_of(t.sewn)]
-                if on and places:
-                    max(on, key=lambda task: int(task.how["turn"])).uses.extend(take(places))
-        # Vents and slits, in the shell and in its lining.
-        for kind in ("vent", "slit"):
-            own = [place for place in free if free[place] == "hem" and kind in place[1].split(" ")]
-            for task in [task for task in self.tasks if task.seams]:
-                found = [each for each in task.seams[0].openings if each.kind == kind]
-                sides = task.sewn
-                if found and role[sides[0][0]] != "lining":
-                    places = take([(p, e) for p, e in own if (p, e.removesuffix(f" {kind}")) in sides])
-                    values = {"length": length_words(found[0].length, units), "of": task.seams}
-                    self.tasks.append(Task(technique=kind, uses=places, values=values, needs={task}))
-            lined = take([place for place in own if place in free and role[place[0]] == "lining"])
-            add("lined_opening", [], lined, kind=translate(kind))
-        for elastic in garment.garment.elastics:
-            along = [
-                (piece.name, edge.name)
-                for piece in self.pieces.values()
-                for edge in piece.edges
-                if line_name(edge.name) == elastic.edge
-            ]
-            cased = take([place for place in along if free.get(place) == "hem"])
-            values = {
-                "edge": translate_name(elastic.edge),
-                "width": length_words(elastic.width, units),
-                "length": length_words(elastic.lengths[self.size], units),
-            }
-            add("casing" if cased else "elastic_band", pieces_of(along), cased, **values)
-            self.tasks[-1].notions.append(
-                translate(
-                    f"{{count}} {'elastic' if elastic.count == 1 else 'elastics'} of {{length}}, at most {{width}} wide",
-                    count=elastic.count,
-                    **values,
-                )
-            )
-        add("hang", [name for name, piece in self.pieces.items() if role[name] == "shell" and is_flounce(piece)])
-        for technique, kind in (("hem", "hem"), ("bind_raw", "seam"), ("raw", "cut")):
-            add(technique, [], of(role, (kind,)))
-        self._close(drafted)
+        self._add("ruffle_gathers", [name for name in ruffles if name in longer and name not in pleated])
+        hems = self._take_of(self._with_role("hood"), ("hem",))
+        width = max((self.pieces[p].edge(e).width for p, e in hems), default=0.0)
+        self._add("hood_hem", [], hems, width=length_words(width, self.units))
+        for name in self._with_role("facing", "strip", "waistband", "cuff", "collar", "hood"):
+            places = [(p, e) for (p, e), kind in self._free.items() if p == name and kind != "hem"]
+            on = [t for t in self.tasks if t.how.get("takes_edges") and name in pieces_of(t.sewn)]
+            if on and places:
+                max(on, key=lambda task: int(task.how["turn"])).uses.extend(self._take(places))
+
+    def _finish_opening(self, kind: str) -> None:
+        """Add vents or slits, in the shell and in its lining."""
+        role = {name: piece.role for name, piece in self.pieces.items()}
+        own = [place for place in self._free if self._free[place] == "hem" and kind in place[1].split(" ")]
+        for task in [task for task in self.tasks if task.seams]:
+            found, sides = [each for each in task.seams[0].openings if each.kind == kind], task.sewn
+            if found and role[sides[0][0]] != "lining":
+                places = self._take([(p, e) for p, e in own if (p, e.removesuffix(f" {kind}")) in sides])
+                values = {"length": length_words(found[0].length, self.units), "of": task.seams}
+                self.tasks.append(Task(technique=kind, uses=places, values=values, needs={task}))
+        lined = self._take([place for place in own if place in self._free and role[place[0]] == "lining"])
+        self._add("lined_opening", [], lined, kind=translate(kind))
+
+    def _thread(self, elastic: Elastic) -> None:
+        """Add an elastic, in a casing or a folded band, with its notion."""
+        along = [
+            (piece.name, edge.name)
+            for piece in self.pieces.values()
+            for edge in piece.edges
+            if line_name(edge.name) == elastic.edge
+        ]
+        cased = self._take([place for place in along if self._free.get(place) == "hem"])
+        values = {
+            "edge": translate_name(elastic.edge),
+            "width": length_words(elastic.width, self.units),
+            "length": length_words(elastic.lengths[self.size], self.units),
+        }
+        self._add("casing" if cased else "elastic_band", pieces_of(along), cased, **values)
+        word = "elastic" if elastic.count == 1 else "elastics"
+        notion = translate(f"{{count}} {word} of {{length}}, at most {{width}} wide", count=elastic.count, **values)
+        self.tasks[-1].notions.append(notion)
 
     def _close(self, drafted: Sequence[DraftedPiece]) -> None:
         """Add what closes the garment, with its notions: zips, buttons, hooks."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.core import FloatArray
-from warpflat.pattern.drafting.polygons import GRID, difference, union, unit_vector
+from warpflat.pattern.drafting.polygons import GRID, difference, turn_between, union, unit_vector
 
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon
@@ -64,14 +64,12 @@ class Wedge:
     @property
     def middle(self) -> FloatArray:
         """Unit vector from the tip along the line on which the wedge is folded."""
-        both = unit_vector(self.left[0] - self.tip) + unit_vector(self.right[-1] - self.tip)
-        return unit_vector(both)
+        return unit_vector(unit_vector(self.left[0] - self.tip) + unit_vector(self.right[-1] - self.tip))
 
     @property
     def opening(self) -> float:
         """Angle [rad] between the legs at the tip."""
-        a, b = unit_vector(self.left[0] - self.tip), unit_vector(self.right[-1] - self.tip)
-        return float(np.arctan2(abs(a[0] * b[1] - a[1] * b[0]), a @ b))
+        return abs(turn_between(self.left[0] - self.tip, self.right[-1] - self.tip))
 
 
 def outline_points(side: Side | Wedge) -> FloatArray:
@@ -121,8 +119,7 @@ def corner_fill(corner: FloatArray, a: FloatArray, b: FloatArray, width_a: float
     import shapely
 
     sine, cosine = float(a[0] * b[1] - a[1] * b[0]), float(a @ b)
-    turn = np.arctan2(sine, cosine)
-    if turn <= 1e-6 or max(width_a, width_b) <= 0:
+    if turn_between(a, b) <= 1e-6 or max(width_a, width_b) <= 0:
         return None
     normal_a, normal_b = np.array([a[1], -a[0]]), np.array([b[1], -b[0]])
     end_a, end_b = corner + width_a * normal_a, corner + width_b * normal_b

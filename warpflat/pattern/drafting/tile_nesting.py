@@ -14,12 +14,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, FloatArray, IntArray
+from warpflat.core import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from shapely import Polygon
 
-__all__ = ["CELL", "Mask", "Places", "TurnedShape", "nest_on_strip", "nest_on_tiles", "orders"]
+__all__ = [
+    "CELL",
+    "Mask",
+    "Places",
+    "TurnedShape",
+    "first_free",
+    "nest_on_strip",
+    "nest_on_tiles",
+    "orders",
+    "touched_cells",
+]
 
 
 #: Cells are about this wide [m], at most.
@@ -78,11 +88,30 @@ class _Grid:
     def touched(self, mask: Mask) -> FloatArray:
         """Return which tiles a mask touches (1, else 0), by the cell of a tile where it starts and the tile: down and across."""
         if id(mask) not in self._touched:
-            rows, columns = (
-                _blocks(mask.cells.shape[axis], self.per_tile[axis], self.shared[axis]) for axis in range(2)
-            )
-            self._touched[id(mask)] = _covered(mask.cells, rows, columns).astype(np.float32)
+            # By the cell of a tile where the mask starts, which of its rows or columns lie in the tiles from there on. The strip that a
+            # tile shares with the one before is printed there, and does not count.
+            ends = []
+            for size, per_tile, shared in zip(mask.cells.shape, self.per_tile, self.shared, strict=True):
+                start, tile = np.arange(per_tile)[:, None], np.arange((size + per_tile - 2) // per_tile + 1)
+                low = np.clip(tile * per_tile + shared - start, 0, size)
+                ends.append((low, np.maximum(low, np.clip((tile + 1) * per_tile - start, 0, size))))
+            (top, bottom), (left, right) = ends
+            sums = np.pad(np.cumsum(np.cumsum(mask.cells, axis=0), axis=1), ((1, 0), (1, 0)))
+
+            def at(row: NDArray[Any], column: NDArray[Any]) -> NDArray[Any]:
+                return np.asarray(sums[row[:, :, None, None], column])
+
+            cells = at(bottom, right) - at(top, right) - at(bottom, left) + at(top, left)
+            self._touched[id(mask)] = (cells > 0).astype(np.float32)
         return self._touched[id(mask)]
+
+    def tiles_under(self, mask: Mask, row: int, column: int) -> BoolArray:
+        """Return the tiles that a mask takes at one place."""
+        (i, first), (j, left) = divmod(row, self.per_tile[0]), divmod(column, self.per_tile[1])
+        covered, tiles = self.touched(mask)[first, :, left, :] > 0.0, np.zeros(self.tiles, dtype=bool)
+        part = tiles[i : i + covered.shape[0], j : j + covered.shape[1]]
+        part |= covered[: part.shape[0], : part.shape[1]]
+        return tiles
 
 
 def nest_on_tiles(
@@ -164,14 +193,10 @@ def nest_on_strip(shapes: Sequence[Polygon], *, width: float, gap: float) -> flo
         places.clear()
         length = 0
         for k in order:
-            # The first free place (row, column) of each mask.
-            found = []
-            for mask in masks[k]:
-                free = places.free(mask)
-                row = int(np.argmax(free.any(axis=1)))
-                if not free[row].any():
-                    return None
-                found.append((row, int(np.argmax(free[row])), mask))
+            free = [places.free(mask) for mask in masks[k]]
+            if not all(each.any() for each in free):
+                return None
+            found = [(*first_free(each), mask) for each, mask in zip(free, masks[k], strict=True)]
             row, column, mask = min(found, key=lambda item: (max(length, item[0] + len(item[2].cells)), item[0]))
             places.take(mask, row, column)
             length = max(length, row + len(mask.cells))
@@ -186,9 +211,14 @@ def nest_on_strip(shapes: Sequence[Polygon], *, width: float, gap: float) -> flo
     return min(lengths) * float(cell[1])
 
 
+def first_free(free: BoolArray) -> tuple[int, int]:
+    """Return the row and the column of the first free place, of which there is one: the lowest row, and there the lowest column."""
+    row, column = divmod(int(np.argmax(free)), free.shape[1])
+    return row, column
+
+
 def _masks(shape: Polygon, cell: FloatArray, gap: float, turns: Sequence[int]) -> list[Mask]:
     """Return a shape as cells in its positions, grown by half of the gap; a cell that it touches is its own."""
-    import shapely
     from shapely.affinity import rotate
 
     found = []
@@ -197,14 +227,13 @@ def _masks(shape: Polygon, cell: FloatArray, gap: float, turns: Sequence[int]) -
         grown = turned.simplify(CELL / 20).buffer(gap / 2 + CELL / 20)
         low, high = np.array(grown.bounds[:2]), np.array(grown.bounds[2:])
         columns, rows = np.maximum(1, np.ceil((high - low) / cell - 1e-9)).astype(int)
-        shapely.prepare(grown)
         extent = np.array(turned.bounds[2:]) - np.array(turned.bounds[:2])
-        cells = _touched_cells(grown, np.array([low[0], high[1]]), cell, (int(rows), int(columns)))
+        cells = touched_cells(grown, np.array([low[0], high[1]]), cell, (int(rows), int(columns)))
         found.append(Mask(cells=cells, quarters=quarters, extent=extent))
     return found
 
 
-def _touched_cells(area: Polygon, corner: FloatArray, cell: FloatArray, shape: tuple[int, int]) -> BoolArray:
+def touched_cells(area: Polygon, corner: FloatArray, cell: FloatArray, shape: tuple[int, int]) -> BoolArray:
     """Return which cells a polygon touches, by row and column from the upper left corner on."""
     import shapely
 
@@ -213,6 +242,7 @@ def _touched_cells(area: Polygon, corner: FloatArray, cell: FloatArray, shape: t
         return shapely.box(left, top - size * cell[1], left + size * cell[0], top)
 
     # Most blocks of cells lie within the polygon or beside it.
+    shapely.prepare(area)
     row, column = np.indices([-(-side // _BLOCK) for side in shape])
     blocks = boxes(row, column, _BLOCK)
     touched = shapely.intersects(area, blocks)
@@ -276,51 +306,11 @@ def _lay(
             return None
         places[k] = best[1:]
         sheet.take(*best[1:])
-        used |= _touched(best[1].cells, best[2], best[3], grid)
+        used |= grid.tiles_under(*best[1:])
         total = float(used.sum()) + SPREAD * (int(used.any(axis=1).sum()) + int(used.any(axis=0).sum()))
         if total >= below:
             return None
     return total, [places[k] for k in range(len(masks))]
-
-
-def _blocks(size: int, per_tile: int, shared: int) -> tuple[IntArray, IntArray]:
-    """Return for a mask that starts at each cell of a tile which of its rows lie in the tiles from there on.
-
-    The strip that a tile shares with the one before is printed there, and does not count.
-    """
-    start = np.arange(per_tile)[:, None]
-    tile = np.arange((size + per_tile - 2) // per_tile + 1)[None, :]
-    low = np.clip(tile * per_tile + shared - start, 0, size)
-    high = np.clip((tile + 1) * per_tile - start, 0, size)
-    return low, np.maximum(low, high)
-
-
-def _covered(cells: BoolArray, rows: tuple[IntArray, IntArray], columns: tuple[IntArray, IntArray]) -> BoolArray:
-    """Return whether blocks of a mask hold any cell: by start and tile down, start and tile across."""
-    sums = np.pad(np.cumsum(np.cumsum(cells, axis=0), axis=1), ((1, 0), (1, 0)))
-
-    def at(r: IntArray, c: IntArray) -> IntArray:
-        return np.asarray(sums[r[:, :, None, None], c[None, None, :, :]])
-
-    (top, bottom), (left, right) = rows, columns
-    return np.asarray(at(bottom, right) - at(top, right) - at(bottom, left) + at(top, left) > 0)
-
-
-def _touched(cells: BoolArray, row: int, column: int, grid: _Grid) -> BoolArray:
-    """Return the tiles that a mask takes at one place."""
-    starts = row % grid.per_tile[0], column % grid.per_tile[1]
-    rows, columns = (
-        (blocks[0][start : start + 1], blocks[1][start : start + 1])
-        for blocks, start in (
-            (_blocks(cells.shape[axis], grid.per_tile[axis], grid.shared[axis]), starts[axis]) for axis in (0, 1)
-        )
-    )
-    covered = _covered(cells, rows, columns)[0, :, 0, :]
-    tiles = np.zeros(grid.tiles, dtype=bool)
-    i, j = row // grid.per_tile[0], column // grid.per_tile[1]
-    part = tiles[i : i + covered.shape[0], j : j + covered.shape[1]]
-    part |= covered[: part.shape[0], : part.shape[1]]
-    return tiles
 
 
 class Places:

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core import FloatArray, arc_lengths
+from warpflat.core import FloatArray, arc_lengths, unit
 from warpflat.pattern.drafting.curves import Curve, cubic_weights, split_bezier
 from warpflat.pattern.drafting.fitting import EdgeKey
-from warpflat.pattern.drafting.piece_parts import Edge
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
+from warpflat.pattern.drafting.polygons import turn_between
 
 __all__ = ["CornerReport", "true_corners", "turned_end"]
 
@@ -63,8 +63,7 @@ class _Corner:
         """Return the sum of the angles [rad] inside the pieces, between an edge and the next one, counter-clockwise."""
         total = 0.0
         for arrive, leave in self.ends:
-            (x, y), (u, v) = -end_direction(curves[arrive[0]].reversed()), end_direction(curves[leave[0]])
-            total += float(np.pi - np.arctan2(x * v - y * u, x * u + y * v))
+            total += np.pi - turn_between(-end_direction(curves[arrive[0]].reversed()), end_direction(curves[leave[0]]))
         return total
 
 
@@ -89,7 +88,7 @@ def true_corners(
     import shapely
 
     start = dict(curves)
-    found = {frozenset(corner.ends): corner for corner in [*_seam_corners(pieces, seams), *_fold_corners(pieces)]}
+    found = {frozenset(corner.ends): corner for corner in _corners(pieces, seams)}
     away = {corner: abs(corner.angle(start) - corner.wanted) for corner in found.values()}
     corners = [corner for corner in found.values() if away[corner] < MEANT]
     shares = np.array([min(1.0, (MEANT - away[corner]) / (MEANT - DOUBTED)) for corner in corners])
@@ -161,34 +160,38 @@ def _least_turns(corners: Sequence[_Corner], shares: FloatArray, curves: Mapping
     return {end: float(turn) for end, turn in zip(ends, solved, strict=True) if abs(turn) > LEAST_TURN}
 
 
-def _seam_corners(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[_Corner]:
-    """Yield the corners at both ends of every seam, and at the mouth of every dart."""
+def _corners(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[_Corner]:
+    """Yield the corners at both ends of every seam and every fold, and at the mouth of every dart."""
     by_name = {piece.name: piece for piece in pieces}
-    for seam in seams:
+    lines: list[tuple[str, Sequence[Sequence[SeamSide]]]]
+    lines = [(seam.name, seam.sides) for seam in (*seams, *(dart for piece in pieces for dart in piece.dart_seams))]
+    lines += [
+        (f"{piece.name}.{edge.name}", ((SeamSide(piece=piece.name, edge=edge.name),),))
+        for piece in pieces
+        for edge in piece.edges
+        if edge.kind == "fold"
+    ]
+    for name, rows in lines:
         for last in (False, True):
-            sides = [row[-1 if last else 0] for row in seam.sides]
-            corner = _corner_between(by_name, seam.name, [(side, last != side.reversed) for side in sides])
-            if corner is not None:
-                yield corner
-    for piece in pieces:
-        for dart in piece.darts:
-            left, right = (SeamSide(piece=piece.name, edge=name) for name in (dart.left, dart.right))
-            corner = _corner_between(by_name, dart.name, [(left, False), (right, True)])
+            sides = [row[-1 if last else 0] for row in rows]
+            corner = _corner_between(by_name, name, [(side, last != side.reversed) for side in sides])
             if corner is not None:
                 yield corner
 
 
-def _corner_between(pieces: Mapping[str, Piece], seam: str, sides: Sequence[tuple[SeamSide, bool]]) -> _Corner | None:
-    """Return the corner at which the edges beside both sides of a seam run on; None where one is no such edge.
+def _corner_between(pieces: Mapping[str, Piece], line: str, sides: Sequence[tuple[SeamSide, bool]]) -> _Corner | None:
+    """Return the corner at which the edges beside both sides of a seam run on, or the one beside a fold; None without such edges.
+
+    At the tip of a dart no edges run on.
 
     Args:
         pieces: by name.
-        seam: its name.
+        line: name of the seam or fold.
         sides: each side's edge, and whether its last point is the corner.
     """
     # The ends of a strip are cut straight across, wherever on a piece they come to lie; those of collars and cuffs are meant.
     roles = [pieces[side.piece].role for side, _ in sides]
-    if len({role == "strip" for role in roles}) > 1 or {"collar", "cuff", "hood"} & set(roles):
+    if len(sides) > 1 and (len({role == "strip" for role in roles}) > 1 or {"collar", "cuff", "hood"} & set(roles)):
         return None
     pairs, outer = [], []
     for side, at_end in sides:
@@ -201,26 +204,8 @@ def _corner_between(pieces: Mapping[str, Piece], seam: str, sides: Sequence[tupl
         pairs.append((seam_end, outer_end) if at_end else (outer_end, seam_end))
         outer.append(outer_end)
     runs_on = " to ".join(f"{piece}.{edge}" for (piece, edge), _ in outer)
-    return _Corner(place=f"{seam}: {runs_on}", ends=tuple(pairs), outer=tuple(outer), wanted=np.pi)
-
-
-def _fold_corners(pieces: Sequence[Piece]) -> Iterator[_Corner]:
-    """Yield the corners at both ends of every fold."""
-    for piece in pieces:
-        for number, fold in enumerate(piece.edges):
-            if fold.kind != "fold":
-                continue
-            for at_end in (False, True):
-                other: Edge = piece.edges[(number + (1 if at_end else -1)) % len(piece.edges)]
-                if other.kind in ("fold", "dart"):
-                    continue
-                ends: tuple[End, End] = (((piece.name, fold.name), at_end), ((piece.name, other.name), not at_end))
-                yield _Corner(
-                    place=f"{piece.name}.{fold.name}: {other.name}",
-                    ends=(ends if at_end else ends[::-1],),
-                    outer=(ends[1],),
-                    wanted=np.pi / 2,
-                )
+    wanted = np.pi / 2 * len(sides)
+    return _Corner(place=f"{line}: {runs_on}", ends=tuple(pairs), outer=tuple(outer), wanted=wanted)
 
 
 #: An end is turned over this much of a curve [m], over less where it would move too far, and not over less than that.
@@ -239,7 +224,7 @@ def end_direction(curve: Curve) -> FloatArray:
     """Return the unit vector in which a curve leaves its first point."""
     steps = curve.bezier[0, 1:] - curve.bezier[0, 0]
     away = steps[np.argmax(np.linalg.norm(steps, axis=1) > 1e-9)]
-    return np.asarray(away / np.linalg.norm(away))
+    return unit(away)
 
 
 def turned_end(curve: Curve, turn: float, reach: float, *, keep_length: bool) -> tuple[Curve, float]:

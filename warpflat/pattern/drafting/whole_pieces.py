@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from warpflat.core import FloatArray, InputError
 from warpflat.pattern.drafting.drafted_darts import fisheye_legs
-from warpflat.pattern.drafting.piece_parts import Dart, Edge, Hole
+from warpflat.pattern.drafting.piece_parts import Edge, Hole
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
+from warpflat.pattern.drafting.polygons import mirror_image
 
 __all__ = ["MIRRORED", "hole_edges", "turn_over", "whole_pieces"]
 
@@ -92,16 +94,14 @@ def whole_pieces(
 
 def turn_over(piece: Piece) -> Piece:
     """Return a piece that is cut turned over, mirrored at x = 0."""
-    across, flip = np.array([-1.0, 1.0]), np.diag([-1.0, 1.0, 1.0])
+    across, flip = np.array([[0.0, 0.0], [0.0, 1.0]]), np.diag([-1.0, 1.0, 1.0])
     return replace(
-        piece, edges=[replace(edge, points=(edge.points * across)[::-1], vertices=None) for edge in piece.edges[::-1]],
-        darts=[_mirrored_dart(dart, "") for dart in piece.darts],
-        holes=[replace(hole, points=(hole.points * across)[::-1]) for hole in piece.holes],
-        internal_lines={name: line * across for name, line in piece.internal_lines.items()},
-        marks={name: mark * across for name, mark in piece.marks.items()},
-        grain=None if piece.grain is None else piece.grain * across, at=_OTHER_SIDE.get(piece.at, piece.at),
+        piece,
+        **_image(piece, piece.edges, across, ""),
+        grain=None if piece.grain is None else mirror_image(piece.grain, across),
+        at=_OTHER_SIDE.get(piece.at, piece.at),
         placement=None if piece.placement is None else flip @ piece.placement @ flip,
-    )  # fmt: skip
+    )
 
 
 def hole_edges(hole: Hole) -> list[Edge]:
@@ -139,25 +139,41 @@ def _unfolded(piece: Piece) -> Piece:
         raise InputError(f"piece {piece.name!r} has {len(folds)} folds; a half has one")
     fold = piece.edges[folds[0]].points
     edges = [*piece.edges[folds[0] + 1 :], *piece.edges[: folds[0]]]
-
-    def reflect(points: FloatArray) -> FloatArray:
-        along = (fold[-1] - fold[0]) / np.linalg.norm(fold[-1] - fold[0])
-        off = points - fold[0]
-        return np.asarray(fold[0] + 2.0 * np.outer(off @ along, along) - off)
-
-    others = [replace(e, name=e.name + MIRRORED, points=reflect(e.points)[::-1], vertices=None) for e in edges[::-1]]
+    other = _image(piece, edges, fold, MIRRORED)
     # Corners on the fold are one point, bit for bit.
-    for near, far in ((edges[-1], others[0]), (others[-1], edges[0])):
+    for near, far in ((edges[-1], other["edges"][0]), (other["edges"][-1], edges[0])):
         far.points[0] = near.points[-1]
-    holes = [replace(h, name=h.name + MIRRORED, points=reflect(h.points)[::-1]) for h in piece.holes]
-    lines = {name + MIRRORED: reflect(line) for name, line in piece.internal_lines.items()}
-    darts = [_mirrored_dart(dart, MIRRORED) for dart in piece.darts]
     return replace(
-        piece, edges=[*edges, *others], darts=[*piece.darts, *darts], holes=[*piece.holes, *holes],
-        internal_lines={**piece.internal_lines, **lines},
-        marks={**piece.marks, **{name + MIRRORED: reflect(mark[None])[0] for name, mark in piece.marks.items()}},
-    )  # fmt: skip
+        piece,
+        edges=[*edges, *other["edges"]],
+        darts=[*piece.darts, *other["darts"]],
+        holes=[*piece.holes, *other["holes"]],
+        internal_lines={**piece.internal_lines, **other["internal_lines"]},
+        marks={**piece.marks, **other["marks"]},
+    )
 
 
-def _mirrored_dart(dart: Dart, ending: str) -> Dart:
-    return replace(dart, name=dart.name + ending, left=dart.right + ending, right=dart.left + ending, fold_to=None)
+def _image(piece: Piece, edges: Sequence[Edge], line: FloatArray, ending: str) -> dict[str, Any]:
+    """Return the mirror images at a straight line (#L by 2 [m]) of some of a piece's edges, and of what lies within it, by field.
+
+    Args:
+        piece: of which they are.
+        edges: that follow each other.
+        line: in which they are mirrored.
+        ending: of their names.
+    """
+    return {
+        "edges": [
+            replace(e, name=e.name + ending, points=mirror_image(e.points, line)[::-1], vertices=None)
+            for e in edges[::-1]
+        ],
+        "darts": [
+            replace(d, name=d.name + ending, left=d.right + ending, right=d.left + ending, fold_to=None)
+            for d in piece.darts
+        ],
+        "holes": [
+            replace(hole, name=hole.name + ending, points=mirror_image(hole.points, line)[::-1]) for hole in piece.holes
+        ],
+        "internal_lines": {name + ending: mirror_image(each, line) for name, each in piece.internal_lines.items()},
+        "marks": {name + ending: mirror_image(mark, line) for name, mark in piece.marks.items()},
+    }

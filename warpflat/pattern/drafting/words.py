@@ -14,7 +14,7 @@ from importlib import resources
 
 from warpflat.core import read_toml
 
-__all__ = ["language_words", "listed", "printed_in", "translate", "translate_name"]
+__all__ = ["language_words", "letters_of", "listed", "printed_in", "translate", "translate_name"]
 
 _EMPTY: Mapping[str, str] = {}
 _table: ContextVar[Mapping[str, str]] = ContextVar("words", default=_EMPTY)
@@ -66,3 +66,12 @@ def listed(names: Sequence[str]) -> str:
     """Return one or more names as a list in the present words: "a, b and c"."""
     both = f" {translate('and')} "
     return both.join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]
+
+
+def letters_of(number: int) -> str:
+    """Return A, B, ... Z, AA, AB, ... for 0, 1, ..."""
+    letters, number = "", number + 1
+    while number:
+        number, digit = divmod(number - 1, 26)
+        letters = chr(ord("A") + digit) + letters
+    return letters

@@ -14,6 +14,7 @@ __all__ = [
     "DRAFTED_CLOTH",
     "ENERGY",
     "LEAST_GAP",
+    "LEAST_PRESSURE",
     "SHARE",
     "SKIN",
     "SMALLEST_SCALE",
@@ -28,8 +29,8 @@ __all__ = [
 ENERGY = "energy"
 #: Colours of bodies, and of cloth that was drafted and bears no map, sRGB.
 SKIN, DRAFTED_CLOTH = (0.88, 0.86, 0.82), (0.62, 0.64, 0.68)
-#: The least upper end of a scale of gaps between cloth and body [mm].
-LEAST_GAP = 5.0
+#: The least upper ends of scales of gaps between cloth and body [mm], and of pressure on the skin [Pa].
+LEAST_GAP, LEAST_PRESSURE = 5.0, 10.0
 #: Of the cloth, by area, within a scale: a few sliver faces would otherwise make the rest of a map pale.
 SHARE = 0.98
 
@@ -58,10 +59,8 @@ _CLOTH, _NO_VALUE = (0.955, 0.94, 0.90), "#c8c8c8"
 
 def energy_colours(density: ArrayLike, scale: float) -> FloatArray:
     """Return sRGB colours (#N by 3, 0 to 1) of energy densities [J/m2] (#N), the last colour above `scale`."""
-    position = np.clip(np.asarray(density, dtype=np.float64) / scale, 0.0, 1.0) * (len(_ANCHORS) - 1)
-    lower = np.minimum(position.astype(np.int64), len(_ANCHORS) - 2)
-    fraction = (position - lower)[..., None]
-    return np.asarray(_ANCHORS[lower] * (1.0 - fraction) + _ANCHORS[lower + 1] * fraction)
+    shares, places = np.asarray(density, dtype=np.float64) / scale, np.linspace(0.0, 1.0, len(_ANCHORS))
+    return np.stack([np.interp(shares, places, channel) for channel in _ANCHORS.T], axis=-1)
 
 
 @dataclass(frozen=True, kw_only=True)

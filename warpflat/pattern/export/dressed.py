@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpflat.core import FloatArray, IntArray
-from warpflat.flat import join_labels, triangulate
+from warpflat.flat import border_edges, join_labels, triangulate
 from warpflat.pattern.export.colours import SKIN
 from warpflat.pattern.export.geometry import outline_edges
 from warpflat.pattern.export.views import Facets, make_facets
@@ -57,17 +57,21 @@ def crop_body(body: Body, worn: FloatArray) -> tuple[IntArray, FloatArray]:
 
     Arms end beside the garment, as those of a dress form do: they would take a third of the page. Their ends are closed.
     """
-    triangles, vertices, ends = triangulate(body.faces)[0], body.vertices, list[IntArray]()
-    for axis, sign in ((1, 1.0), (1, -1.0), (0, 1.0), (0, -1.0)):
-        limit = float((sign * worn[:, axis]).max()) + _AROUND
-        triangles, vertices, edges = _cut(triangles, vertices, sign * vertices[:, axis] - limit)
-        ends += [edges] if axis == 0 else []
+    import trimesh
+
+    low, high = worn.min(axis=0) - _AROUND, worn.max(axis=0) + _AROUND
+    inwards = [[0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]
+    whole = trimesh.Trimesh(body.vertices, triangulate(body.faces)[0], process=False)
+    near = whole.slice_plane([low, high, low, high], inwards)
+    triangles, vertices = np.asarray(near.faces), np.asarray(near.vertices)
     # Small parts of hands and arms would hang in the air.
     label = join_labels(len(vertices), triangles[:, :2].ravel(), triangles[:, 1:].ravel())[triangles[:, 0]]
     size = np.bincount(label)
     triangles = triangles[size[label] >= _SCRAP * size.max(initial=0)]
-    for end in ends:
-        edges = end[np.isin(end, triangles).all(axis=1)]
+    border = border_edges(triangles)
+    for end in (low[0], high[0]):
+        # Turned round, so that the face beyond the edges looks outwards.
+        edges = border[(np.abs(vertices[border, 0] - end) < 1e-9).all(axis=1)][:, ::-1]
         if len(edges):
             # With vertices of its own: light does not bend around its edge.
             rim = vertices[edges.ravel()]
@@ -76,24 +80,3 @@ def crop_body(body: Body, worn: FloatArray) -> tuple[IntArray, FloatArray]:
             vertices = np.concatenate([vertices, rim, rim.mean(axis=0)[None]])
             triangles = np.concatenate([triangles, cap])
     return triangles.astype(np.int32), vertices
-
-
-def _cut(triangles: IntArray, vertices: FloatArray, beyond: FloatArray) -> tuple[IntArray, FloatArray, IntArray]:
-    """Leave out what of a mesh lies where `beyond` (#V) is positive; return triangles, vertices and the edges of the cut."""
-    outside = beyond[triangles] > 0.0
-    number = outside.sum(axis=1)
-    found, edges = [triangles[number == 0]], []
-    for several, alone_is_outside in ((1, True), (2, False)):
-        crossed = triangles[number == several]
-        # The vertex that is alone on its side comes first.
-        first = (outside[number == several] == alone_is_outside).argmax(axis=1)
-        a, b, c = np.take_along_axis(crossed, (first[:, None] + np.arange(3)) % 3, axis=1).T
-        p, q = len(vertices) + np.arange(2 * len(a)).reshape(2, -1)
-        ends = np.concatenate([b, c])
-        share = (beyond[np.tile(a, 2)] / (beyond[np.tile(a, 2)] - beyond[ends]))[:, None]
-        vertices = np.concatenate([vertices, (1.0 - share) * vertices[np.tile(a, 2)] + share * vertices[ends]])
-        parts = ((p, b, c), (p, c, q)) if alone_is_outside else ((a, p, q),)
-        found += [np.column_stack(part) for part in parts]
-        # As a face beyond the cut would have them, so that it looks outwards.
-        edges.append(np.column_stack([p, q] if alone_is_outside else [q, p]))
-    return np.concatenate(found), vertices, np.concatenate(edges)

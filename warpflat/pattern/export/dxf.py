@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,12 +19,11 @@ from warpflat.core import (
     BoolArray,
     FloatArray,
     InputError,
-    arc_lengths,
     atomic_path,
     control_in,
     nearest,
     plain_letters,
-    points_at_lengths,
+    resample,
     source_date,
     turning_angles,
 )
@@ -32,6 +31,7 @@ from warpflat.pattern.drafting.cut_list import cloths_of
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.label import text_width
 from warpflat.pattern.drafting.layout import lay_out, nests
+from warpflat.pattern.drafting.measures import INCH
 from warpflat.pattern.drafting.seam_words import seam_words
 from warpflat.pattern.export.letters import titles
 
@@ -40,11 +40,11 @@ __all__ = ["block_name", "write_dxf"]
 
 DIALECTS = ("aama", "astm")
 #: File units per metre, by what the file says of itself.
-UNITS = {"metric": 1000.0, "english": 1000.0 / 25.4}
+UNITS = {"metric": 1000.0, "english": 1.0 / INCH}
 #: A boundary vertex that turns by more than this [rad] is a turn point, else a curve point.
 TURN = np.radians(12.0)
-#: Height [m] of a piece's texts where there is room, and the distance of their rows as a multiple of it.
-TEXT, ROW = 0.004, 1.75
+#: Height [m] of a piece's texts where there is room, that of names within it, and the distance of rows as a multiple of it.
+TEXT, NAME, ROW = 0.004, 0.003, 1.75
 
 
 def write_dxf(
@@ -76,96 +76,48 @@ def write_dxf(
     if units not in UNITS:
         raise InputError(f"unknown DXF units {units!r}; {nearest(units, UNITS)}")
     chosen = tuple(garment.pieces) if sizes is None else tuple(sizes)
-    for size in chosen:
-        garment.garment.check_size(size)
     scale, created = UNITS[units], source_date()
     rules = grade_rules(garment, chosen) if rul is not None and len(chosen) > 1 else None
-    blocks, space = list[str](), list[str]()
-    groups = list(filter(None, (tuple(p for p in nest if p.size in chosen) for nest in nests(garment))))
-    taken: set[str] = set()
+    blocks, space, taken = list[str](), list[str](), set[str]()
     seams = seam_words(garment.garment.seams)
     names = {piece.name: piece.piece.title or piece.name for row in garment.pieces.values() for piece in row}
     written = titles(list(dict.fromkeys(names.values())), lambda name: any(map(str.isalnum, _ascii(name))))
-    for placed in lay_out(groups, width=1.5).placed:
+    for placed in lay_out(nests(garment, chosen), width=1.5).placed:
         for piece in placed.pieces:
             title = written[names[piece.name]]
             name = block_name(piece, taken, title)
-            block = list[str]()
-            corners = np.flatnonzero(_is_corner(piece.cut_line))
-            boundary = np.roll(piece.cut_line, -int(corners[0]), axis=0) if len(corners) else piece.cut_line
-            _polyline(block, boundary, scale, "1", closed=True)
-            for point, turns in zip(boundary, _is_corner(boundary), strict=True):
-                _point(block, point, scale, "2" if turns else "3")
-            # Slit notches are points with their depth for height.
-            for notch in piece.notches:
-                angle = float(np.degrees(np.arctan2(notch.direction[1], notch.direction[0]))) % 360.0
-                for base in notch.base:
-                    location = (base[0] * scale, base[1] * scale, notch.depth * scale)
-                    block.append(_tags((0, "POINT"), (8, "4"), *_place(location), *([(50, angle)] if angle else [])))
-            # The sewing line edge by edge, each with its name and, in rows below, what is sewn to it.
-            for edge in piece.edges:
-                if edge.kind == "fold":
-                    _line(block, edge.line[[0, -1]], scale, "6")
-                else:
-                    # The legs of a dart that is cut away are seams with an allowance, those of a folded one lie inside.
-                    line = piece.drawn_line(edge)
-                    _polyline(block, line, scale, "8" if edge.kind == "dart" and edge.width == 0 else "14")
-                texts = [f"EDGE: {edge.name}", *(f"SEAM: {words}" for words in seams.get((piece.name, edge.name), ()))]
-                middle = edge.line[len(edge.line) // 2] if len(edge.line) > 2 else edge.line.mean(axis=0)
-                for row, text in enumerate(texts):
-                    _text(block, text, middle - [0.0, 0.003 * ROW * row], scale, "15", 0.003)
-            _line(block, piece.grain, scale, "7")
-            for line_name, line in piece.internal_lines.items():
-                _polyline(block, line, scale, "8")
-                _text(block, f"LINE: {line_name}", line[len(line) // 2], scale, "15", 0.003)
-            for dart in piece.darts:
-                if dart.fold is not None:
-                    _polyline(block, dart.fold, scale, "8")
-                word = "DART" if dart.dart.pleat is None else "PLEAT"
-                _text(block, f"{word}: {dart.dart.name}", dart.tip, scale, "15", 0.003)
-            for dart_name, line in piece.fisheyes.items():
-                _polyline(block, line, scale, "8", closed=True)
-                _text(block, f"DART: {dart_name}", line.mean(axis=0), scale, "15", 0.003)
-            for cutout in piece.cutouts.values():
-                _polyline(block, cutout.cut_line, scale, "11", closed=True)
-                if cutout.width > 0:
-                    _polyline(block, cutout.sew_line, scale, "14", closed=True)
-            for hole in piece.drill_holes:
-                _point(block, hole.at, scale, "13")
-            if dialect == "astm":
-                _polyline(block, boundary, scale, "84", closed=True)
-                for edge in piece.edges:
-                    if edge.kind not in ("fold", "dart"):
-                        _polyline(block, edge.curve.sample(5e-6), scale, "87")
-            # The system texts stand where the label has its room; notes may run on to the right.
-            texts = [f"PIECE NAME: {title}", f"SIZE: {piece.size}", f"QUANTITY: {piece.piece.quantity}"]
-            texts += [
+            block = _lines(piece, scale, seams, dialect)
+            # The system texts stand where the label has its room.
+            texts = [
+                f"PIECE NAME: {title}",
+                f"SIZE: {piece.size}",
+                f"QUANTITY: {piece.piece.quantity}",
                 f"CATEGORY: {'FOLD' if piece.piece.on_fold else 'PIECE'}",
                 f"FABRIC: {' / '.join(cloths_of(piece))}",
+                *("ANNOTATION: " + text.replace("\n", " ") for text, _ in piece.label.lines[2:3]),
             ]
-            texts += ["ANNOTATION: " + text.replace("\n", " ") for text, _ in piece.label.lines[2:3]]
             low, high = piece.label.box.min(axis=0), piece.label.box.max(axis=0)
             widest = max(text_width(text, 1.0) for text in texts)
+            # Notes may run on to the right.
             texts += [f"ANNOTATION: {note}" for note in piece.notes]
             height = min(TEXT, (high[0] - low[0]) / widest, (high[1] - low[1]) / len(texts) / ROW)
             for row, text in enumerate(texts):
                 _text(block, text, np.array([low[0], high[1] - ROW * height * (row + 0.8)]), scale, "1", height)
             for point in rules.points.get(piece.name, ()) if rules is not None and piece.size == rules.sample else ():
-                _text(block, f"# {point.rule}", point.at, scale, point.layer, 0.003)
+                _text(block, f"# {point.rule}", point.at, scale, point.layer, NAME)
             begin = _tags((0, "BLOCK"), (8, "0"), (2, name), (70, 0), *_place((0.0, 0.0)), (3, name), (1, ""))
             blocks += [begin, *block, _tags((0, "ENDBLK"), (8, "0"))]
             space.append(_tags((0, "INSERT"), (8, "1"), (2, name), *_place(placed.offset * scale)))
-    table = _ascii(garment.name)[:20]
+    table, program = _ascii(garment.name)[:20], ["AUTHOR: warpflat", "PRODUCT: warpflat", f"VERSION: {__version__}"]
+    made = [f"CREATION DATE: {created:%d-%m-%Y}", f"CREATION TIME: {created:%H:%M}"]
     style = [
         f"STYLE NAME: {garment.name}",
-        f"CREATION DATE: {created:%d-%m-%Y}",
-        f"CREATION TIME: {created:%H:%M}",
-        "AUTHOR: warpflat",
+        *made,
+        program[0],
         f"SAMPLE SIZE: {garment.garment.sample}",
         *([f"GRADE RULE TABLE: {table}"] if rules is not None and table else []),
         f"UNITS: {units.upper()}",
-        "PRODUCT: warpflat",
-        f"VERSION: {__version__}",
+        *program[1:],
     ]
     for row, text in enumerate(style):
         _text(space, text, np.array([0.0, -0.010 * (row + 1)]), scale, "1", 0.005)
@@ -174,28 +126,66 @@ def write_dxf(
             stream.write(_tags((0, "SECTION"), (2, section)) + "".join(content) + _tags((0, "ENDSEC")))
         stream.write(_tags((0, "EOF")))
     if rules is not None and rul is not None:
-        # The table of grade rules.
-        lines = [
-            "ANSI/AAMA VERSION: 1.0.0" if dialect == "aama" else "ASTM/D13 Proposal 1 Version: D6673-10",
-            "AUTHOR: warpflat",
-            "PRODUCT: warpflat",
-            f"VERSION: {__version__}",
-            f"CREATION DATE: {created:%d-%m-%Y}",
-            f"CREATION TIME: {created:%H:%M}",
-            f"UNITS: {units.upper()}",
-            f"GRADE RULE TABLE: {table}",
-            f"NUMBER OF SIZES: {len(rules.sizes)}",
-            f"SIZE LIST: {' '.join(size.replace(' ', '_') for size in rules.sizes)}",
-            f"SAMPLE SIZE: {rules.sample.replace(' ', '_')}",
-        ]
-        for number, moves in enumerate(rules.moves, 1):
-            lines.append(f"RULE: DELTA {number}")
-            pairs = [f"{x:>10.3f},{y:>9.3f}" for x, y in (moves * scale + 0.0).tolist()]
-            lines += ["".join(pairs[k : k + _IN_LINE]) for k in range(0, len(pairs), _IN_LINE)]
-        lines.append("END")
-        text = "\r\n".join(lines) + "\r\n"
+        version = "ANSI/AAMA VERSION: 1.0.0" if dialect == "aama" else "ASTM/D13 Proposal 1 Version: D6673-10"
+        head = [version, *program, *made, f"UNITS: {units.upper()}", f"GRADE RULE TABLE: {table}"]
+        text = "\r\n".join([*head, *rules.table(scale), "END", ""])
         with atomic_path(rul) as temporary:
             temporary.write_bytes(text.encode("ascii", "replace"))
+
+
+def _lines(
+    piece: DraftedPiece, scale: float, seams: Mapping[tuple[str, str], Sequence[str]], dialect: str
+) -> list[str]:
+    """Return the lines and points of a piece in units of the file, and at its edges, lines and darts their names.
+
+    Below the name of an edge stands what is sewn to it.
+    """
+    block = list[str]()
+    corners = np.flatnonzero(_is_corner(piece.cut_line))
+    boundary = np.roll(piece.cut_line, -int(corners[0]), axis=0) if len(corners) else piece.cut_line
+    _polyline(block, boundary, scale, "1", closed=True)
+    for point, turns in zip(boundary, _is_corner(boundary), strict=True):
+        _point(block, point, scale, "2" if turns else "3")
+    # Slit notches are points with their depth for height.
+    for notch in piece.notches:
+        angle = float(np.degrees(np.arctan2(notch.direction[1], notch.direction[0]))) % 360.0
+        for base in notch.base:
+            location = (base[0] * scale, base[1] * scale, notch.depth * scale)
+            block.append(_tags((0, "POINT"), (8, "4"), *_place(location), *([(50, angle)] if angle else [])))
+    for edge in piece.edges:
+        if edge.kind == "fold":
+            _line(block, edge.line[[0, -1]], scale, "6")
+        else:
+            # The legs of a dart that is cut away are seams with an allowance, those of a folded one lie inside.
+            line = piece.drawn_line(edge)
+            _polyline(block, line, scale, "8" if edge.kind == "dart" and edge.width == 0 else "14")
+        texts = [f"EDGE: {edge.name}", *(f"SEAM: {words}" for words in seams.get((piece.name, edge.name), ()))]
+        middle = edge.line[len(edge.line) // 2] if len(edge.line) > 2 else edge.line.mean(axis=0)
+        for row, text in enumerate(texts):
+            _text(block, text, middle - [0.0, NAME * ROW * row], scale, "15", NAME)
+    _line(block, piece.grain, scale, "7")
+    for name, line in piece.internal_lines.items():
+        _polyline(block, line, scale, "8")
+        _text(block, f"LINE: {name}", line[len(line) // 2], scale, "15", NAME)
+    for dart in piece.darts:
+        if dart.fold is not None:
+            _polyline(block, dart.fold, scale, "8")
+        word = "DART" if dart.dart.pleat is None else "PLEAT"
+        _text(block, f"{word}: {dart.dart.name}", dart.tip, scale, "15", NAME)
+    for name, line in piece.fisheyes.items():
+        _polyline(block, line, scale, "8", closed=True)
+        _text(block, f"DART: {name}", line.mean(axis=0), scale, "15", NAME)
+    for cutout in piece.cutouts.values():
+        _polyline(block, cutout.cut_line, scale, "11", closed=True)
+        if cutout.width > 0:
+            _polyline(block, cutout.sew_line, scale, "14", closed=True)
+    for hole in piece.drill_holes:
+        _point(block, hole.at, scale, "13")
+    if dialect == "astm":
+        _polyline(block, boundary, scale, "84", closed=True)
+        for edge in (edge for edge in piece.edges if edge.kind not in ("fold", "dart")):
+            _polyline(block, edge.curve.sample(5e-6), scale, "87")
+    return block
 
 
 def block_name(piece: DraftedPiece, taken: set[str], title: str = "") -> str:
@@ -300,6 +290,19 @@ class GradeRules:
     moves: list[FloatArray] = field(default_factory=list)
     points: dict[str, list[GradePoint]] = field(default_factory=dict)
 
+    def table(self, scale: float) -> list[str]:
+        """Return the lines of the table of sizes and rules, in units of the file."""
+        lines = [
+            f"NUMBER OF SIZES: {len(self.sizes)}",
+            f"SIZE LIST: {' '.join(size.replace(' ', '_') for size in self.sizes)}",
+            f"SAMPLE SIZE: {self.sample.replace(' ', '_')}",
+        ]
+        for number, moves in enumerate(self.moves, 1):
+            lines.append(f"RULE: DELTA {number}")
+            pairs = [f"{x:>10.3f},{y:>9.3f}" for x, y in (moves * scale + 0.0).tolist()]
+            lines += ["".join(pairs[k : k + _IN_LINE]) for k in range(0, len(pairs), _IN_LINE)]
+        return lines
+
     def rule(self, moves: FloatArray) -> int:
         """Return the number of a rule, a new one if there is none alike."""
         for number, known in enumerate(self.moves, 1):
@@ -334,19 +337,13 @@ def grade_rules(garment: DraftedGarment, sizes: Sequence[str]) -> GradeRules:
 
 def _places(piece: DraftedPiece) -> dict[tuple[str, str, float], FloatArray]:
     """Return the places of one piece that are graded, by layer, name and number."""
-    import shapely
-
     found: dict[tuple[str, str, float], FloatArray] = {}
-    ring = piece.cut_line
-    line = shapely.LinearRing(ring)
     for edge in piece.edges:
         if edge.kind == "dart" and edge.width == 0:
             continue
-        points = edge.line
-        length = float(arc_lengths(points)[-1])
-        chord = float(np.linalg.norm(points[-1] - points[0]))
-        for share in (0.0, *(_BETWEEN if chord < length * (1.0 - _STRAIGHT) else ())):
-            found["2", edge.name, share] = _on_cut_line(points, share, edge.width, ring, line)
+        chord = float(np.linalg.norm(edge.line[-1] - edge.line[0]))
+        for share in (0.0, *(_BETWEEN if chord < edge.length * (1.0 - _STRAIGHT) else ())):
+            found["2", edge.name, share] = _on_cut_line(edge.line, share, edge.width, piece.cut_line)
     counts: dict[str, int] = {}
     for notch in piece.notches:
         for base in notch.base:
@@ -357,21 +354,15 @@ def _places(piece: DraftedPiece) -> dict[tuple[str, str, float], FloatArray]:
     return found
 
 
-def _on_cut_line(points: FloatArray, share: float, width: float, ring: FloatArray, line: object) -> FloatArray:
+def _on_cut_line(points: FloatArray, share: float, width: float, ring: FloatArray) -> FloatArray:
     """Return the place on the cutting line beside a place of the sewing line; at a corner its nearest corner."""
     import shapely
 
-    assert isinstance(line, shapely.LinearRing)
-    length = float(arc_lengths(points)[-1])
-    at = points_at_lengths(points, [share * length])[0]
+    at = resample(points, share)
     if share == 0.0:
-        around = np.vstack([ring[-1:], ring, ring[:1]])
-        before, after = around[1:-1] - around[:-2], around[2:] - around[1:-1]
-        turns = np.abs(
-            np.arctan2(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0], (before * after).sum(axis=1))
-        )
-        corners = ring[turns > np.radians(12.0)]
-        near = corners[np.linalg.norm(corners - at, axis=1) < 4.0 * max(width, 0.012)] if len(corners) else corners
-        if len(near):
-            return np.asarray(near[np.linalg.norm(near - at, axis=1).argmin()])
+        corners = ring[_is_corner(ring)]
+        away = np.linalg.norm(corners - at, axis=1)
+        if away.min(initial=np.inf) < 4.0 * max(width, 0.012):
+            return np.asarray(corners[away.argmin()])
+    line = shapely.LinearRing(ring)
     return np.asarray(line.interpolate(line.project(shapely.Point(at))).coords[0])

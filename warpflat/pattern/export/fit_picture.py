@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.core import FloatArray, weighted_percentile
-from warpflat.flat import MAPS, RANGES, WornFit, border_edges, limit_words, pressure_words, remedy_words, strain_words
-from warpflat.pattern.export.colours import Scale
+from warpflat.flat import MAPS, WornFit, border_edges, remedy_words
+from warpflat.pattern.export.colours import LEAST_PRESSURE, Scale
 from warpflat.pattern.export.figure import drawn_page
 from warpflat.pattern.export.letters import is_drawn, titles
 from warpflat.pattern.export.views import DrawnView, make_facets, pattern_view
+from warpflat.pattern.export.wear_words import RANGES, limit_words, pressure_words, strain_words
 
 if TYPE_CHECKING:
     from warpflat.flat import Flattening
@@ -26,7 +27,7 @@ OnBody = Mapping[str, FloatArray]
 
 
 # The least range of a scale: below it a map would show rounding.
-_LEAST_SCALE = {"%": 0.5, "degrees": 0.5, "N/m": 1.0, "Pa": 1.0}
+_LEAST_SCALE = {"%": 0.5, "degrees": 0.5, "N/m": 1.0, "Pa": LEAST_PRESSURE}
 # Strain around the wearer is below 0 where there is ease.
 _BODY_MAPS = {
     "body_strain": ("on the wearer: strain, ease", 100.0, "%"),

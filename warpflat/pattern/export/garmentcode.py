@@ -13,8 +13,8 @@ from pydantic_core import to_json
 from scipy.spatial.transform import Rotation
 
 from warpflat.core import FloatArray, arc_lengths, atomic_path, points_at_lengths, turning_angles
-from warpflat.pattern.drafting.curves import cubic_weights
-from warpflat.pattern.drafting.drafted import DraftedGarment
+from warpflat.pattern.drafting.curves import CHORD, TOLERANCE, cubic_weights
+from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.fitting import EdgeKey
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.drafting.whole_pieces import whole_pieces
@@ -22,8 +22,8 @@ from warpflat.pattern.export.read_garmentcode import CENTIMETRES, LABELS
 
 __all__ = ["garmentcode_json", "write_garmentcode"]
 
-# An edge that strays from its chord by less is straight; no cubic strays from its line, or differs in length, by more [m].
-_STRAIGHT, _FIT, _LENGTH = 2e-5, 1e-4, 1e-5
+# No cubic differs in length from its line by more [m]. It strays from it no farther than fitted curves do from clean borders.
+_LENGTH = 1e-5
 # Corners inside an edge turn by more than this [rad]. Ends of edges on both sides of a seam that are nearer than this [m] are stitched
 # to each other, and no edge is split into shorter ones.
 _CORNER, _SHORTEST = np.radians(25.0), 4e-3
@@ -57,90 +57,35 @@ def garmentcode_json(garment: DraftedGarment, *, size: str | None = None) -> tup
         InputError: an unknown size, or a piece that cannot be unfolded.
     """
     chosen = garment.garment.sample if size is None else size
-    garment.garment.piece(next(iter(garment.pieces.values()))[0].name, chosen)
-    flat, left_out = list[Piece](), list[str]()
-    for drafted in garment.pieces[chosen]:
-        own, frame = drafted.piece, np.vstack([drafted.frame, [0.0, 0.0, 1.0]])
-        place = None if own.placement is None else own.placement @ np.linalg.inv(frame)
-        edges = [replace(edge.edge, points=edge.line, vertices=None) for edge in drafted.edges]
-        flat.append(
-            replace(own, edges=edges, holes=(), internal_lines={}, marks={}, grain=drafted.grain, placement=place)
-        )
-        if holes := [*drafted.cutouts, *drafted.fisheyes]:
-            left_out.append(f"{own.name}: GarmentCode knows no holes: {', '.join(holes)} left out")
-    pieces, seams, _ = whole_pieces(flat, garment.garment.seams, unsewn=True)
+    garment.garment.check_size(chosen)
+    left_out = [
+        f"{piece.name}: GarmentCode knows no holes: {', '.join(holes)} left out"
+        for piece in garment.pieces[chosen]
+        if (holes := [*piece.cutouts, *piece.fisheyes])
+    ]
+    pieces, seams, _ = whole_pieces(map(_drawn, garment.pieces[chosen]), garment.garment.seams, unsewn=True)
     lines = {(name, edge.name): edge.points for name, piece in pieces.items() for edge in piece.edges}
-    pleats = {f"{name}.{dart.name}": dart.pleat for name, piece in pieces.items() for dart in piece.darts}
-    splits: dict[EdgeKey, list[_Split]] = {key: [] for key in lines}
-    stitches, sewn = list[tuple[tuple[_Split, ...], str]](), set[EdgeKey]()
-    for seam in seams:
-        edges_of = [side.place for side in seam.stretches]
-        if sewn & set(edges_of):
-            left_out.append(
-                f"seam {seam.name!r}: one of its edges is in another seam, and GarmentCode stitches an edge once: left out"
-            )
-            continue
-        sewn |= set(edges_of)
-        strands = [_Strand.of(chain, lines) for chain in seam.sides]
-        depth = pleats.get(seam.name)
-        rows = _divide(strands, seam, depth)
-        for row in rows:
-            for split in row:
-                splits[split.key].append(split)
-            if depth is None or row[0].at < depth:
-                stitches.append((row, seam.name))
-    for key in lines.keys() - sewn:
-        strand = _Strand.of([SeamSide(piece=key[0], edge=key[1])], lines)
-        splits[key] = [split for (split,) in _divide([strand], None, None)]
+    stitched, splits, notes = _stitched(pieces, seams, lines)
+    left_out += notes
     number: dict[tuple[EdgeKey, float], int] = {}
     panels: dict[str, Any] = {}
     places = _places(pieces, seams, lines)
     for name, piece in pieces.items():
-        rows_of = [
-            (edge.name, split)
-            for edge in piece.edges
-            for split in sorted(splits[name, edge.name], key=lambda each: each.begin)
+        parts = [
+            split for edge in piece.edges for split in sorted(splits[name, edge.name], key=lambda each: each.begin)
         ]
-        number |= {(split.key, split.begin): k for k, (_, split) in enumerate(rows_of)}
-        corners = np.array([split.control[0] for _, split in rows_of])
-        origin, place = corners[0], places[name]
-        edges_written = list[dict[str, Any]]()
-        for k, (edge, split) in enumerate(rows_of):
-            entry: dict[str, Any] = {"endpoints": [k, (k + 1) % len(rows_of)]}
-            if split.is_curved:
-                chord = split.control[3] - split.control[0]
-                axes = np.stack([chord, [-chord[1], chord[0]]]) / (chord @ chord)
-                entry["curvature"] = {
-                    "type": "cubic",
-                    "params": ((split.control[1:3] - split.control[0]) @ axes.T).tolist(),
-                }
-            if label := LABELS.get(piece.levels.get(edge, "")):
-                entry["label"] = label
-            edges_written.append({**entry, "name": edge})
-        turn = np.column_stack([place[:, :2], np.cross(place[:, 0], place[:, 1])])
-        panels[name] = {
-            "translation": (CENTIMETRES * (place @ [*origin, 1.0])).tolist(),
-            "rotation": Rotation.from_matrix(turn).as_euler("xyz", degrees=True).tolist(),
-            "vertices": (CENTIMETRES * (corners - origin)).tolist(),
-            "edges": edges_written,
-            "grain": None if piece.grain is None else (CENTIMETRES * (piece.grain - origin)).tolist(),
-            "placed": piece.placement is not None,
-        }
-    written = []
-    for both, seam_name in stitches:
+        number |= {(split.key, split.begin): k for k, split in enumerate(parts)}
+        panels[name] = _panel(piece, parts, places[name])
+    stitches = []
+    for both, seam in stitched:
         sides: list[Any] = [
-            {
-                "panel": each.key[0],
-                "edge": number[each.key, each.begin],
-                "seam": seam_name,
-                "reversed": each.reversed,
-            }
+            {"panel": each.key[0], "edge": number[each.key, each.begin], "seam": seam, "reversed": each.reversed}
             for each in both
         ]
-        written.append([*sides, "right_wrong"] if both[0].reversed == both[1].reversed else sides)
-    opened = _openings(written, {name: len(panel["vertices"]) for name, panel in panels.items()})
+        stitches.append([*sides, "right_wrong"] if both[0].reversed == both[1].reversed else sides)
+    opened = _openings(stitches, {name: len(panel["vertices"]) for name, panel in panels.items()})
     for at in opened:
-        (first, second), ends = written[at][:2], stitches[at][0]
+        (first, second), ends = stitches[at][:2], stitched[at][0]
         length = float(arc_lengths(cubic_weights(np.linspace(0.0, 1.0, 101)) @ ends[0].control)[-1])
         left_out.append(
             f"seam {first['seam']!r} is open over {1e3 * length:.0f} mm between {first['panel']} and {second['panel']}: "
@@ -148,22 +93,83 @@ def garmentcode_json(garment: DraftedGarment, *, size: str | None = None) -> tup
         )
     pattern: dict[str, Any] = {
         "panels": panels,
-        "stitches": [stitch for at, stitch in enumerate(written) if at not in opened],
+        "stitches": [stitch for at, stitch in enumerate(stitches) if at not in opened],
         "panel_order": list(panels),
     }
     if opened:
-        pattern["open"] = [{"at": at, "stitch": written[at]} for at in opened]
+        pattern["open"] = [{"at": at, "stitch": stitches[at]} for at in opened]
+    properties = {
+        "curvature_coords": "relative",
+        "normalize_panel_translation": False,
+        "normalized_edge_loops": True,
+        "units_in_meter": int(CENTIMETRES),
+    }
+    return {"pattern": pattern, "parameters": {}, "parameter_order": [], "properties": properties}, tuple(left_out)
+
+
+def _drawn(drafted: DraftedPiece) -> Piece:
+    """Return a piece along its drawn lines, in their plane, without what GarmentCode does not know."""
+    own, frame = drafted.piece, np.vstack([drafted.frame, [0.0, 0.0, 1.0]])
+    return replace(
+        own,
+        edges=[replace(edge.edge, points=edge.line, vertices=None) for edge in drafted.edges],
+        holes=(),
+        internal_lines={},
+        marks={},
+        grain=drafted.grain,
+        placement=None if own.placement is None else own.placement @ np.linalg.inv(frame),
+    )
+
+
+def _stitched(
+    pieces: Mapping[str, Piece], seams: Sequence[Seam], lines: Mapping[EdgeKey, FloatArray]
+) -> tuple[list[tuple[tuple[_Split, ...], str]], dict[EdgeKey, list[_Split]], list[str]]:
+    """Split all edges: return which parts are stitched to each other, with their seam, all parts by edge, and what is left out."""
+    pleats = {f"{name}.{dart.name}": dart.pleat for name, piece in pieces.items() for dart in piece.darts}
+    splits: dict[EdgeKey, list[_Split]] = {key: [] for key in lines}
+    stitched, sewn, left_out = list[tuple[tuple[_Split, ...], str]](), set[EdgeKey](), list[str]()
+    for seam in seams:
+        edges = {side.place for side in seam.stretches}
+        if sewn & edges:
+            left_out.append(
+                f"seam {seam.name!r}: one of its edges is in another seam, and GarmentCode stitches an edge once: left out"
+            )
+            continue
+        sewn |= edges
+        depth = pleats.get(seam.name)
+        for row in _divide([_Strand.of(chain, lines) for chain in seam.sides], seam, depth):
+            for split in row:
+                splits[split.key].append(split)
+            if depth is None or row[0].at < depth:
+                stitched.append((row, seam.name))
+    for key in lines.keys() - sewn:
+        strand = _Strand.of([SeamSide(piece=key[0], edge=key[1])], lines)
+        splits[key] = [split for (split,) in _divide([strand], None, None)]
+    return stitched, splits, left_out
+
+
+def _panel(piece: Piece, parts: Sequence[_Split], place: FloatArray) -> dict[str, Any]:
+    """Return the entry of a piece whose outline is some parts, in order, and which hangs at a place."""
+    corners, edges = np.array([split.control[0] for split in parts]), list[dict[str, Any]]()
+    for k, split in enumerate(parts):
+        edges.append({"endpoints": [k, (k + 1) % len(parts)]})
+        if split.is_curved:
+            chord = split.control[3] - split.control[0]
+            axes = np.stack([chord, [-chord[1], chord[0]]]) / (chord @ chord)
+            params = ((split.control[1:3] - split.control[0]) @ axes.T).tolist()
+            edges[-1]["curvature"] = {"type": "cubic", "params": params}
+        if label := LABELS.get(piece.levels.get(split.key[1], "")):
+            edges[-1]["label"] = label
+        edges[-1]["name"] = split.key[1]
+    origin, turn = corners[0], np.column_stack([place[:, :2], np.cross(place[:, 0], place[:, 1])])
     return {
-        "pattern": pattern,
-        "parameters": {},
-        "parameter_order": [],
-        "properties": {
-            "curvature_coords": "relative",
-            "normalize_panel_translation": False,
-            "normalized_edge_loops": True,
-            "units_in_meter": int(CENTIMETRES),
-        },
-    }, tuple(left_out)
+        "translation": (CENTIMETRES * (place @ [*origin, 1.0])).tolist(),
+        "rotation": Rotation.from_matrix(turn).as_euler("xyz", degrees=True).tolist(),
+        "vertices": (CENTIMETRES * (corners - origin)).tolist(),
+        "edges": edges,
+        "grain": None if piece.grain is None else (CENTIMETRES * (piece.grain - origin)).tolist(),
+        "placed": piece.placement is not None,
+    }
 
 
 def _openings(stitches: Sequence[Sequence[Any]], corners: Mapping[str, int]) -> list[int]:
@@ -266,7 +272,7 @@ class _Strand:
         steps = np.unique(np.concatenate([inside, np.linspace(a, b, _FEWEST)]))
         control, off = _cubic(points_at_lengths(line, steps))
         chord = control[0] + np.linspace(0.0, 1.0, 4)[:, None] * (control[3] - control[0])
-        curved = bool(np.abs(control - chord).max() > _STRAIGHT)
+        curved = bool(np.abs(control - chord).max() > CHORD)
         if side.reversed:
             control, a = control[::-1], float(arc[-1]) - b
         found = _Split(
@@ -337,7 +343,7 @@ def _cubic(points: FloatArray) -> tuple[FloatArray, float]:
     length = float(arc_lengths(cubic_weights(np.linspace(0.0, 1.0, 201)) @ control)[-1])
     # A closed line has no chord to which its control points could be relative.
     closed = float(np.linalg.norm(chord)) < 0.1 * arc[-1]
-    return control, np.inf if closed else max(off / _FIT, abs(length - float(arc[-1])) / _LENGTH)
+    return control, np.inf if closed else max(off / TOLERANCE, abs(length - float(arc[-1])) / _LENGTH)
 
 
 def _places(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from warpflat.core import FloatArray, IntArray
-from warpflat.flat import area_vectors, triangulate
+from warpflat.flat import flat_areas, half_edges, triangulate
 
 __all__ = [
     "Polylines",
@@ -34,7 +34,7 @@ def polylines_of(lines: Mapping[str, Any] | None) -> dict[str, Polylines]:
 def face_areas(positions: FloatArray, faces: IntArray) -> FloatArray:
     """Return the area [m2] of each face (#F by 4) over positions (#V by 2 or 3); quads are split along corners 0-2."""
     triangles, face = triangulate(faces)
-    areas = np.linalg.norm(area_vectors(positions, triangles), axis=1)
+    areas = flat_areas(positions, triangles)
     return np.bincount(face, weights=areas, minlength=len(faces)).astype(np.float64)
 
 
@@ -45,19 +45,6 @@ def corner_mean(values: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def outline_edges(faces: IntArray) -> IntArray:
-    """Return the edges with one face only (#B by 2), as (lower, higher) vertex: border, holes, sides of cracks.
-
-    These are the edges of ``warpflat.flat.surface.half_edges.border_edges`` without their direction, which costs a sort of one
-    array instead of an indexed one: it matters at a million faces.
-    """
-    keys = []
-    is_quad = faces[:, 3] >= 0
-    stride = np.int64(faces.max(initial=0)) + 1
-    for part, sides in ((faces[is_quad], 4), (faces[~is_quad], 3)):
-        for side in range(sides):
-            a, b = part[:, side].astype(np.int64), part[:, (side + 1) % sides].astype(np.int64)
-            keys.append(np.minimum(a, b) * stride + np.maximum(a, b))
-    ordered = np.sort(np.concatenate(keys))
-    same = ordered[1:] == ordered[:-1]
-    alone = ordered[~(np.append(same, False) | np.insert(same, 0, False))] if len(ordered) else ordered
-    return np.column_stack([alone // stride, alone % stride]).astype(np.int32)
+    """Return the edges with one face only (#B by 2), as (lower, higher) vertex: border, holes, sides of cracks."""
+    sides = half_edges(faces)
+    return sides.edges[sides.count == 1]

@@ -8,7 +8,7 @@ room.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -50,9 +50,8 @@ def draw_lines(
     others: Sequence[DrawnView] = (),
 ) -> list[str]:
     """Draw the lines of a view with their names, none of them on the cloth of other views; return the names for which there was no room."""
-    parts_of = drawn.view.lines
     lines = dict[str, FloatArray]()
-    for name, parts in parts_of.items():
+    for name, parts in drawn.view.lines.items():
         visible = [drawn.visible_line(part) for part in parts]
         for part, points in zip(parts, visible, strict=True):
             if drawn.view.vectors is None or name == datum:
@@ -65,99 +64,134 @@ def draw_lines(
         # The legs of darts need no names: everybody sees what they are.
         if len(longest) > 1 and not name.endswith((".left", ".right")):
             lines[name] = longest
-    # The stretches of a line between darts need one name together.
-    unplaced = [name for name in lines if name_without_number(name, lines) == name]
-    sizes = {name: pen.measure(name, LABEL_SIZE) for name in lines}
+    names = _Names(pen, room, drawn, datum, page, others, lines)
+    on_border = np.unique(drawn.view.facets.outline)
+    border = [name for name in lines if np.isin(np.concatenate(drawn.view.lines[name]), on_border).mean() > 0.5]
+    inner = [name for name in lines if name not in border]
+    names.place_along(inner, covered=True)
+    names.place_in_columns(inner)
+    names.place_along(border, covered=False)
+    names.place_along(border, covered=True)
+    names.place_outside(border)
+    names.place_outside(names.across(inner))
+    names.place_anywhere()
+    return names.unplaced
 
-    def place(name: str, spots: Iterable[Spot], *, may_cross: bool = True) -> None:
+
+class _Names:
+    """The names of lines of a view, written where there is room for them.
+
+    Attributes:
+        unplaced: names that have no place yet; the stretches of a line between darts need one name together.
+    """
+
+    def __init__(
+        self,
+        pen: Pen,
+        room: LabelRoom,
+        drawn: DrawnView,
+        datum: str | None,
+        page: tuple[float, float, float, float],
+        others: Sequence[DrawnView],
+        lines: Mapping[str, FloatArray],
+    ) -> None:
+        self._pen, self._room, self._drawn, self._datum, self._page = pen, room, drawn, datum, page
+        self._others, self._lines = others, lines
+        self._sizes = {name: pen.measure(name, LABEL_SIZE) for name in lines}
+        self.unplaced = [name for name in lines if name_without_number(name, lines) == name]
+
+    def _place(self, name: str, spots: Iterable[Spot], *, may_cross: bool = True) -> None:
         """Write a name at the first spot where there is room for it, on no cloth of another view."""
-        width, height = sizes[name]
-        for other in others:
+        width, height = self._sizes[name]
+        for other in self._others:
             spots = _spots_on_cloth(other, spots, width, height, share=0.0)
-        avoid = [line for other, line in lines.items() if other != name]
-        spot = room.place(spots, width, height, page, avoid, may_cross=may_cross)
+        avoid = [line for other, line in self._lines.items() if other != name]
+        spot = self._room.place(spots, width, height, self._page, avoid, may_cross=may_cross)
         if spot is None:
             return
-        colour = GRAIN if name == datum else INK
+        colour = GRAIN if name == self._datum else INK
         angle = float(np.degrees(spot.angle))
         options = {"ha": "center", "rotation": angle, "rotation_mode": "anchor", "color": colour}
-        pen.write(spot.x, spot.y, name, LABEL_SIZE, halo=True, **options)
+        self._pen.write(spot.x, spot.y, name, LABEL_SIZE, halo=True, **options)
         leader = leader_line(spot, width)
         if leader is not None:
-            pen.line(leader, width=0.6, colour=colour)
-            room.take_line(leader, 0.03)
-        unplaced.remove(name)
+            self._pen.line(leader, width=0.6, colour=colour)
+            self._room.take_line(leader, 0.03)
+        self.unplaced.remove(name)
 
-    def place_along(names: Iterable[str], *, covered: bool) -> None:
+    def _off_cloth(self, name: str, spots: Iterable[Spot]) -> Iterator[Spot]:
+        return _spots_on_cloth(self._drawn, spots, *self._sizes[name], share=0.0)
+
+    def _left(self, names: Iterable[str]) -> list[str]:
+        return [name for name in names if name in self.unplaced]
+
+    def place_along(self, names: Iterable[str], *, covered: bool) -> None:
         """Place names along their lines, all on the cloth or all off it."""
-        for name in [name for name in names if name in unplaced]:
-            width, height = sizes[name]
-            spots = spots_along(lines[name], width, 0.62 * height + 0.02)
-            place(name, _spots_on_cloth(drawn, spots, width, height, share=float(covered)), may_cross=False)
+        for name in self._left(names):
+            width, height = self._sizes[name]
+            spots = spots_along(self._lines[name], width, 0.62 * height + 0.02)
+            on_cloth = _spots_on_cloth(self._drawn, spots, width, height, share=float(covered))
+            self._place(name, on_cloth, may_cross=False)
 
-    def place_outside(names: Iterable[str]) -> None:
+    def place_outside(self, names: Iterable[str]) -> None:
         """Place names off the cloth beside their lines, level, as near as there is room."""
-        for name in [name for name in names if name in unplaced]:
+        for name in self._left(names):
             # A leader begins at a point of the line that is not near to other lines, if there is one.
-            points = resample(lines[name], _SHARES)
-            beside = np.concatenate([np.empty((0, 2)), *(line for other, line in lines.items() if other != name)])
+            points, others = (
+                resample(self._lines[name], _SHARES),
+                [each for other, each in self._lines.items() if other != name],
+            )
+            beside = np.concatenate([np.empty((0, 2)), *others])
             away = np.linalg.norm(points[:, None] - beside, axis=2).min(axis=1, initial=np.inf)
             clear = away > _LEAST_DISTANCE if (away > _LEAST_DISTANCE).any() else np.ones(len(points), dtype=bool)
-            spots = spots_beside([(x, y) for x, y in points[clear].tolist()], sizes[name][0], (1.0, -1.0))
-            place(name, _spots_on_cloth(drawn, spots, *sizes[name], share=0.0), may_cross=False)
+            spots = spots_beside([(x, y) for x, y in points[clear].tolist()], self._sizes[name][0], (1.0, -1.0))
+            self._place(name, self._off_cloth(name, spots), may_cross=False)
 
-    def across(names: Iterable[str]) -> dict[str, dict[float, tuple[float, float]]]:
+    def across(self, names: Iterable[str]) -> dict[str, dict[float, tuple[float, float]]]:
         """Return the names without a place whose lines run across, each with the ends to the left (-1) and right (1)."""
         found = dict[str, dict[float, tuple[float, float]]]()
-        for name in [name for name in names if name in unplaced]:
-            line = lines[name]
+        for name in self._left(names):
+            line = self._lines[name]
             first, last = line[np.argmin(line[:, 0])], line[np.argmax(line[:, 0])]
             if abs(last[1] - first[1]) <= _STEEP * (last[0] - first[0]):
                 found[name] = {side: (float(end[0]), float(end[1])) for side, end in ((-1.0, first), (1.0, last))}
         return found
 
-    on_border = np.unique(drawn.view.facets.outline)
-    border = [name for name in lines if np.isin(np.concatenate(parts_of[name]), on_border).mean() > 0.5]
-    inner = [name for name in lines if name not in border]
-    place_along(inner, covered=True)
-    # Lines that run across have their names beside the piece, one below the other, where the leader is shorter.
-    columns: dict[float, list[tuple[float, str, tuple[float, float]]]] = {1.0: [], -1.0: []}
-    for name, ends in across(inner).items():
-        lengths = dict[float, float]()
-        for side, end in ends.items():
-            spots = spots_beside([end], sizes[name][0], [side])
-            out = next(_spots_on_cloth(drawn, spots, *sizes[name], share=0.0), None)
-            leader = None if out is None else leader_line(out, sizes[name][0])
-            lengths[side] = np.inf if leader is None else polyline_length(leader)
-        side = -1.0 if lengths[-1.0] < lengths[1.0] - _LEFT_BONUS else 1.0
-        columns[side].append((-ends[side][1], name, ends[side]))
-    for side, named in columns.items():
-        height = max((sizes[name][1] for _, name, _ in named), default=0.0)
-        wanted = [-below for below, _, _ in sorted(named)]
-        levels = space_out(wanted, _LINE_SPACING * height, page[1] + height, page[3] - height)
-        for level, (_, name, end) in zip(levels, sorted(named), strict=True):
-            spots = spots_beside([end], sizes[name][0], [side], level=level)
-            place(name, _spots_on_cloth(drawn, spots, *sizes[name], share=0.0), may_cross=False)
-    place_along(border, covered=False)
-    place_along(border, covered=True)
-    place_outside(border)
-    place_outside(across(inner))
-    # Wherever there is room: on the cloth, beyond an end, away from the middle.
-    for name in list(unplaced):
-        line, (width, height) = lines[name], sizes[name]
-        place(name, [*spots_along(line, width, 0.62 * height + 0.02), *spots_beyond_ends(line, width, height)])
-        if name in unplaced:
-            x, y = line[len(line) // 2].tolist()
-            place(
-                name,
-                [
+    def place_in_columns(self, names: Iterable[str]) -> None:
+        """Place names of lines that run across beside the piece, one below the other, where the leader is shorter."""
+        columns: dict[float, list[tuple[float, str, tuple[float, float]]]] = {1.0: [], -1.0: []}
+        for name, ends in self.across(names).items():
+            width, lengths = self._sizes[name][0], dict[float, float]()
+            for side, end in ends.items():
+                out = next(self._off_cloth(name, spots_beside([end], width, [side])), None)
+                leader = None if out is None else leader_line(out, width)
+                lengths[side] = np.inf if leader is None else polyline_length(leader)
+            side = -1.0 if lengths[-1.0] < lengths[1.0] - _LEFT_BONUS else 1.0
+            columns[side].append((-ends[side][1], name, ends[side]))
+        for side, named in columns.items():
+            height = max((self._sizes[name][1] for _, name, _ in named), default=0.0)
+            wanted = [-below for below, _, _ in sorted(named)]
+            levels = space_out(wanted, _LINE_SPACING * height, self._page[1] + height, self._page[3] - height)
+            for level, (_, name, end) in zip(levels, sorted(named), strict=True):
+                spots = spots_beside([end], self._sizes[name][0], [side], level=level)
+                self._place(name, self._off_cloth(name, spots), may_cross=False)
+
+    def place_anywhere(self) -> None:
+        """Place names wherever there is room: on the cloth, beyond an end, away from the middle."""
+        for name in list(self.unplaced):
+            line, (width, height) = self._lines[name], self._sizes[name]
+            self._place(
+                name, [*spots_along(line, width, 0.62 * height + 0.02), *spots_beyond_ends(line, width, height)]
+            )
+            if name in self.unplaced:
+                x, y = line[len(line) // 2].tolist()
+                spots = [
                     Spot(x=x + side * (0.5 * width + outwards), y=y + rise, leader=(x, y))
                     for side in (1.0, -1.0)
                     for outwards in (0.25, 0.5, 0.8, 1.2)
                     for rise in (0.0, 0.25, -0.25, 0.5, -0.5)
-                ],
-            )
-    return unplaced
+                ]
+                self._place(name, spots)
 
 
 def _spots_on_cloth(

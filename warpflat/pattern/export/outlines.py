@@ -2,32 +2,43 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from warpflat.core import FloatArray, InputError, format_count, off_line, quote_value
+from warpflat.core import FloatArray, InputError, find_unused_name, format_count, off_line, quote_value
 from warpflat.flat import join_labels
+from warpflat.pattern.drafting.outline_edges import boundary_edges
 from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT
+from warpflat.pattern.drafting.pieces import Piece
 
 __all__ = [
     "MEET",
+    "MOST_POINTS",
+    "TOO_MANY",
     "DrawnLine",
     "Outlines",
+    "boundary_pieces",
+    "by_size",
     "check_closed",
     "close_lines",
     "counted",
     "find_outlines",
     "left_out",
+    "read_quantity",
     "simple_ring",
 ]
 
 #: Ends of lines that are nearer to each other than this [m] meet.
 MEET = 5e-5
+#: Points of a drawing, at most: a pattern of several sizes has some ten thousand; and what is said of more.
+MOST_POINTS = 1_000_000
+TOO_MANY = f"the drawing has more than {MOST_POINTS:,} points; leave out all but the pattern"
 # Cloth of this area [m2] at most is left out where an outline crosses itself at a corner: an allowance's width, squared.
 _CORNER = 1e-4
 # A line that crosses itself about so many times is a scribble.
@@ -37,9 +48,8 @@ _POINT = 1e-6
 # A line whose ends lack less than this share of its length to meet, a side at most, is an outline that does not close, if it goes
 # around this share of the largest piece.
 _NEARLY_CLOSED, _LEAST_SHARE = 0.4, 0.1
-# A line within another one lies in it though it strays out by this [m]; it is the other's own, such as its sewing line, where it
-# is nowhere farther from it than this [m].
-_WITHIN, _BESIDE = 5e-4, 0.04
+# A line within another one is the other's own, such as its sewing line, where it is nowhere farther from it than this [m].
+_BESIDE = 0.04
 # The frame of a page has the page's sides but for this share.
 _FRAME = 0.05
 
@@ -157,6 +167,39 @@ def simple_ring(points: FloatArray, where: str) -> FloatArray:
     return np.asarray(parts[0].exterior.coords)[:-1]
 
 
+def read_quantity(text: str) -> int:
+    """Return how often a piece is cut, as a file has it; 1 where it is no number from 1 to 999."""
+    return int(text) if re.fullmatch(r"\s*0*[1-9][0-9]{0,2}\s*", text) else 1
+
+
+def boundary_pieces(rings: Sequence[DrawnLine], allowance: float | None, where: str, taken: set[str]) -> list[Piece]:
+    """Return the pieces of which a drawing has the outlines alone, called by their names or "piece_1" and so on.
+
+    Args:
+        rings: the outlines.
+        allowance: from them to the sewing lines [m]; none if not given.
+        where: what messages begin with.
+        taken: names of other pieces; theirs are added.
+
+    Raises:
+        InputError: nothing is left within the allowance, or there are too many points.
+    """
+    pieces = []
+    for number, ring in enumerate(rings, start=1):
+        name = find_unused_name(ring.name or f"piece_{number}", taken)
+        taken.add(name)
+        pieces.append(Piece(name=name, edges=boundary_edges(ring.points, allowance, f"{where}: {name}")))
+    return pieces
+
+
+def by_size(pieces: Iterable[Piece]) -> dict[str, list[Piece]]:
+    """Return pieces by their sizes."""
+    sizes: dict[str, list[Piece]] = {}
+    for piece in pieces:
+        sizes.setdefault(piece.size, []).append(piece)
+    return sizes
+
+
 def counted(names: Sequence[str]) -> str:
     """Return names in their order, those that occur more than once with their number: "HATCH (3), IMAGE"."""
     count = {name: names.count(name) for name in dict.fromkeys(names)}
@@ -201,7 +244,8 @@ def find_outlines(
     if page is not None and len(rings) > 1:
         frames = [k for k, ring in enumerate(rings) if _is_frame(ring.points, page)]
         frames = frames if len(frames) < len(rings) else []
-        notes += [f"{_called(rings[k])} has the page's size and was taken for its frame" for k in frames]
+        names = [quote_value(rings[k].name) if rings[k].name else "a closed line" for k in frames]
+        notes += [f"{name} has the page's size and was taken for its frame" for name in names]
     rings = [ring for k, ring in enumerate(rings) if k not in frames]
     whole = [simple_ring(ring.points, f"{where}: {ring.name}" if ring.name else where) for ring in rings]
     polygons = np.array([shapely.Polygon(ring) for ring in whole])
@@ -213,7 +257,7 @@ def find_outlines(
         around = around[taken[around]]
         for other in around.tolist():
             if other not in wide:
-                wide[other] = polygons[other].buffer(_WITHIN, quad_segs=2)
+                wide[other] = polygons[other].buffer(FOLD_STRAIGHT, quad_segs=2)
                 shapely.prepare(wide[other])
         others = [other for other in around.tolist() if wide[other].covers(polygon)]
         own = [k for k in others if shapely.hausdorff_distance(polygon.exterior, polygons[k].exterior) <= _BESIDE]
@@ -260,10 +304,6 @@ def check_closed(chains: Sequence[FloatArray], pieces: Sequence[Any], where: str
             raise InputError(
                 f"{where}: an outline is open by {1e3 * gap:.1f} mm at ({at}) mm; join its ends, for a piece is a closed line"
             )
-
-
-def _called(ring: DrawnLine) -> str:
-    return quote_value(ring.name) if ring.name else "a closed line"
 
 
 def _largest_first(rings: Sequence[DrawnLine]) -> list[DrawnLine]:

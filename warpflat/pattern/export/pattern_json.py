@@ -1,16 +1,19 @@
 """`pattern.json`: a drafted pattern with everything, written and read back: edges, cut lines, notches, darts, stitches, the mesh.
 
-The models say what is read, with types, bounds and lengths. Lengths are metres, angles radians. Keys that follow from others,
-such as `matches`, are written for other programs and not read.
+The models say what is read, with types, bounds and lengths. What a model and the object that it tells of call alike is written and
+read by that name alone (`_told`, `_made`). Lengths are metres, angles radians. Keys that follow from others, such as `matches`, are
+written for other programs and not read.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
@@ -37,14 +40,13 @@ from warpflat.pattern.drafting.drafted import (
     DraftedEdge,
     DraftedGarment,
     DraftedPiece,
-    DrillHole,
-    Notch,
     SeamReport,
 )
 from warpflat.pattern.drafting.label import Label
-from warpflat.pattern.drafting.piece_parts import Dart, Edge, FoundSeam, Hole
-from warpflat.pattern.drafting.pieces import Elastic, Pattern, Piece, Seam, SeamOpening, SeamSide
-from warpflat.pattern.drafting.worn import ClothKind, Measure, NeededOpening, ViewedPiece, Worn
+from warpflat.pattern.drafting.measures import Units
+from warpflat.pattern.drafting.piece_parts import MOST_ALLOWANCE, Dart, Edge, Hole
+from warpflat.pattern.drafting.pieces import OpeningKind, Pattern, Piece, Role, Seam, SeamSide
+from warpflat.pattern.drafting.polygons import signed_area
 
 __all__ = [
     "SCHEMA",
@@ -77,8 +79,7 @@ def _ascending(shares: list[float]) -> list[float]:
 
 
 def _ring(points: list[list[float]]) -> list[list[float]]:
-    x, y = np.transpose(points)
-    if abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2 < SMALLEST_AREA:
+    if abs(signed_area(np.array(points))) < SMALLEST_AREA:
         raise ValueError("encloses no area")
     return points
 
@@ -86,6 +87,8 @@ def _ring(points: list[list[float]]) -> list[list[float]]:
 # A larger coordinate is an error of units, and its powers may overflow.
 Coordinate = Annotated[float, Field(ge=-10_000, le=10_000)]
 Length = Annotated[float, Field(ge=0, le=10_000)]
+Allowance = Annotated[float, Field(ge=0, le=MOST_ALLOWANCE)]
+Count = Annotated[int, Field(ge=1, le=1_000_000)]
 Name = Annotated[str, AfterValidator(lambda name: check_label(name, "name"))]
 Text = Annotated[str, AfterValidator(_text)]
 Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
@@ -104,13 +107,19 @@ class Entry(Table):
 
     model_config = ConfigDict(extra="ignore")
 
+    def _check_as_many(self, key: str, other: str, what: str) -> None:
+        """Check that two lists are equally long, with one entry for each of something."""
+        one, two = len(getattr(self, key)), len(getattr(self, other))
+        if one != two:
+            raise ValueError(f"{key} has {one} entries, {other} {two}; there is one for each {what}")
+
 
 class EdgeEntry(Entry):
     """An edge of the sewing line (see `warpflat.pattern.drafting.drafted.DraftedEdge`)."""
 
     name: Name
     kind: Literal["seam", "hem", "fold", "cut", "dart"]
-    allowance: Annotated[float, Field(ge=0, le=0.5)]
+    allowance: Allowance
     bezier: Annotated[list[Segment], Field(min_length=1)]
     straight: list[bool]
     line: Line
@@ -121,15 +130,9 @@ class EdgeEntry(Entry):
 
     @model_validator(mode="after")
     def _lengths_agree(self) -> EdgeEntry:
-        if len(self.straight) != len(self.bezier):
-            raise ValueError(
-                f"straight has {len(self.straight)} entries, bezier {len(self.bezier)}; there is one for each curve"
-            )
-        if self.mesh_vertices is not None and len(self.mesh_vertices) != len(self.point_lengths):
-            raise ValueError(
-                f"mesh_vertices has {len(self.mesh_vertices)} entries, point_lengths {len(self.point_lengths)}; "
-                "there is one for each point"
-            )
+        self._check_as_many("straight", "bezier", "curve")
+        if self.mesh_vertices is not None:
+            self._check_as_many("mesh_vertices", "point_lengths", "point")
         return self
 
 
@@ -176,10 +179,7 @@ class LabelEntry(Entry):
 
     @model_validator(mode="after")
     def _lengths_agree(self) -> LabelEntry:
-        if len(self.lines) != len(self.heights):
-            raise ValueError(
-                f"heights has {len(self.heights)} entries, lines {len(self.lines)}; there is one for each line"
-            )
+        self._check_as_many("heights", "lines", "line")
         return self
 
 
@@ -191,30 +191,16 @@ class PieceEntry(Entry):
     """
 
     fabric: Text
-    quantity: Annotated[int, Field(ge=1, le=1_000_000)]
-    role: Literal[
-        "shell",
-        "facing",
-        "strip",
-        "waistband",
-        "cuff",
-        "collar",
-        "hood",
-        "lining",
-        "interfacing",
-        "pocket",
-        "placket",
-        "tie",
-        "fly",
-    ] = "shell"
-    also: dict[Text, Annotated[int, Field(ge=1, le=1_000_000)]] = Field(default_factory=dict)
+    quantity: Count
+    role: Role = "shell"
+    also: dict[Text, Count] = Field(default_factory=dict)
     enlarged: Annotated[list[Annotated[float, Field(gt=0, le=2)]], Field(min_length=2, max_length=2)] = Field(
         default=[1.0, 1.0]
     )
     marks: list[Name] = Field(default_factory=list)
     paired: bool
     title: Text = ""
-    printed_units: Literal["mm", "cm", "in"] = "cm"
+    printed_units: Units = "cm"
     at: Literal["", "front", "back", "left arm", "right arm"] = ""
     placement: Annotated[list[Row], Field(min_length=3, max_length=3)] | None = None
     levels: dict[Name, Text] = Field(default_factory=dict)
@@ -227,7 +213,7 @@ class PieceEntry(Entry):
     internal_lines: dict[Name, Line]
     cutouts: dict[Name, Ring]
     cutout_sew_lines: dict[Name, Ring] = Field(default_factory=dict)
-    cutout_allowances: dict[Name, Annotated[float, Field(ge=0, le=0.5)]] = Field(default_factory=dict)
+    cutout_allowances: dict[Name, Allowance] = Field(default_factory=dict)
     fisheye_darts: dict[Name, Ring]
     grain: Ends
     label: LabelEntry
@@ -247,7 +233,7 @@ class SideEntry(Entry):
 class OpeningEntry(Entry):
     """An opening of a seam (see `warpflat.pattern.drafting.pieces.SeamOpening`)."""
 
-    kind: Literal["zip", "buttons", "slit", "vent"]
+    kind: OpeningKind
     length: float
     begin: float
     whole: bool
@@ -265,7 +251,7 @@ class StitchEntry(Entry):
     sides: Annotated[list[Annotated[list[SideEntry], Field(min_length=1)]], Field(min_length=2, max_length=2)]
 
 
-class SeamEntry(Entry):
+class ReportEntry(Entry):
     """The lengths of the two sides of a seam in one size (see `warpflat.pattern.drafting.drafted.SeamReport`)."""
 
     name: Name
@@ -274,7 +260,7 @@ class SeamEntry(Entry):
     length_mm: Annotated[list[float], Field(min_length=2, max_length=2)]
     ease: float
     difference_mm: float
-    difference_per_50mm_mm: float | None
+    local_mm: float | None = Field(alias="difference_per_50mm_mm")
     notches_mm: float | None = None
 
 
@@ -334,12 +320,12 @@ class WornEntry(Entry):
     buttonholes: Literal["left", "right"] = "right"
 
 
-class FoundSeamEntry(Entry):
+class PriceEntry(Entry):
     """A seam that was found on a whole garment (see `warpflat.pattern.drafting.piece_parts.FoundSeam`)."""
 
     name: Name
-    length_m: Length
-    released_j: float | None
+    length: Length = Field(alias="length_m")
+    released: float | None = Field(alias="released_j")
     needed: Text
 
 
@@ -351,10 +337,10 @@ class PatternEntry(Entry):
     words: dict[Text, Text] = Field(default_factory=dict)
     sizes: dict[Text, Annotated[dict[Name, PieceEntry], Field(min_length=1)]] = Field(min_length=1)
     stitches: list[StitchEntry]
-    seams: list[SeamEntry]
+    seams: list[ReportEntry]
     elastics: list[ElasticEntry] = Field(default_factory=list)
     worn: WornEntry | None = None
-    found_seams: list[FoundSeamEntry] = Field(default_factory=list)
+    found_seams: list[PriceEntry] = Field(default_factory=list)
 
 
 #: Increased when a reader of the old form would misread the new one.
@@ -369,62 +355,25 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
     cut turned over, and "copy" its number, from 1 for the second. An edge's `point_lengths` are the lengths along its line at the
     points of its mesh's border, and `fit_error` is the largest distance of the curve from them. Numbers are not rounded.
     """
-    sample = next(iter(garment.pieces.values()))
-    stitches: list[dict[str, Any]] = [
-        {
-            "name": seam.name,
-            "kind": "seam",
-            "ease": seam.ease,
-            "eased": list(seam.eased),
-            "sides": [[_side(part) for part in side] for side in seam.sides],
-            "openings": [asdict(opening) for opening in seam.openings],
-        }
-        for seam in garment.garment.seams
-    ]
-    stitches += [
-        {
-            "name": f"{piece.name}.{dart.dart.name}",
-            "kind": "dart",
-            "ease": 0.0,
-            "eased": [0.0, 1.0],
-            "sides": [
-                [_side(SeamSide(piece=piece.name, edge=dart.dart.left))],
-                [_side(SeamSide(piece=piece.name, edge=dart.dart.right, reversed=True))],
-            ],
-        }
-        for piece in sample
-        for dart in piece.darts
-    ]
+    pattern, sample = garment.garment, next(iter(garment.pieces.values()))
+    darts = [seam for piece in sample for seam in piece.piece.dart_seams]
     return {
         "schema": SCHEMA,
         "warpflat": __version__,
         "units": "m",
         "name": garment.name,
-        "sample_size": garment.garment.sample,
-        "words": dict(garment.garment.words),
+        "sample_size": pattern.sample,
+        "words": dict(pattern.words),
         "sizes": {size: {piece.name: _piece(piece) for piece in pieces} for size, pieces in garment.pieces.items()},
-        "cut_list": {
-            size: {cloth: [asdict(entry) for entry in rows] for cloth, rows in cut_list(pieces).items()}
-            for size, pieces in garment.pieces.items()
-        },
-        "stitches": stitches,
-        "elastics": [asdict(elastic) for elastic in garment.garment.elastics],
-        "worn": None if garment.garment.worn is None else _worn(garment.garment.worn),
-        "found_seams": [seam.as_dict() for seam in garment.garment.found_seams],
-        "seams": [
-            {
-                "name": report.name,
-                "size": report.size,
-                "sides": list(report.sides),
-                "length_mm": list(report.length_mm),
-                "ease": report.ease,
-                "difference_mm": report.difference_mm,
-                "difference_per_50mm_mm": report.local_mm,
-                "notches_mm": report.notches_mm,
-                "matches": report.matches,
-            }
-            for report in garment.seams
+        "cut_list": {size: _plain(cut_list(pieces)) for size, pieces in garment.pieces.items()},
+        "stitches": [
+            *({**_stitch(seam, "seam"), "openings": _plain(seam.openings)} for seam in pattern.seams),
+            *(_stitch(dart, "dart") for dart in darts),
         ],
+        "elastics": _plain(pattern.elastics),
+        "worn": _plain(pattern.worn),
+        "found_seams": [seam.as_dict() for seam in pattern.found_seams],
+        "seams": [_told(ReportEntry, report, matches=report.matches) for report in garment.seams],
     }
 
 
@@ -434,91 +383,66 @@ def write_pattern_json(garment: DraftedGarment, path: str | os.PathLike[str]) ->
         temporary.write_bytes(to_json(pattern_json(garment), indent=1) + b"\n")
 
 
-def _side(side: SeamSide) -> dict[str, Any]:
-    entry = {"piece": side.piece, "edge": side.edge, "reversed": side.reversed, "mirrored": side.mirrored}
-    return {**entry, "copy": side.copy} if side.copy else entry
+def _plain(value: Any) -> Any:
+    """Return dataclasses, arrays and sequences, in each other too, as dicts and lists."""
+    if is_dataclass(value):
+        return {each.name: _plain(getattr(value, each.name)) for each in fields(value)}
+    if isinstance(value, Mapping):
+        return {key: _plain(each) for key, each in value.items()}
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return [_plain(each) for each in value] if isinstance(value, list | tuple) else value
+
+
+def _told(model: type[Entry], thing: Any, /, **given: Any) -> dict[str, Any]:
+    """Return what an entry tells of an object: the fields that both have, by the keys of the file, and what is given."""
+    own = {each.name for each in fields(thing)} - given.keys()
+    keys = {name: field.alias or name for name, field in model.model_fields.items() if name in own}
+    return {**{key: _plain(getattr(thing, name)) for name, key in keys.items()}, **given}
+
+
+def _stitch(seam: Seam, kind: str) -> dict[str, Any]:
+    sides = [
+        [_told(SideEntry, side, **({"copy": side.copy} if side.copy else {})) for side in row] for row in seam.sides
+    ]
+    return {"name": seam.name, "kind": kind, "ease": seam.ease, "eased": list(seam.eased), "sides": sides}
 
 
 def _piece(piece: DraftedPiece) -> dict[str, Any]:
-    return {
-        "fabric": piece.piece.fabric,
-        "quantity": piece.piece.quantity,
-        "role": piece.piece.role,
-        "also": dict(piece.piece.also),
-        "enlarged": list(piece.enlarged),
-        "marks": sorted(piece.piece.marks),
-        "paired": piece.piece.paired,
-        "title": piece.piece.title,
-        "printed_units": piece.piece.units,
-        "on_fold": piece.piece.on_fold,
-        "at": piece.piece.at,
-        "placement": None if piece.piece.placement is None else piece.piece.placement.tolist(),
-        "frame": piece.frame.tolist(),
-        "levels": dict(piece.piece.levels),
-        "edges": [
-            {
-                "name": edge.name,
-                "kind": edge.kind,
-                "allowance": edge.width,
-                "length": edge.length,
-                "bezier": edge.curve.bezier.tolist(),
-                "straight": edge.curve.straight.tolist(),
-                "line": edge.line.tolist(),
-                "fit_error": edge.fit_error,
-                "tolerance": edge.tolerance,
-                "point_lengths": edge.places.tolist(),
-                "mesh_vertices": None if edge.edge.vertices is None else np.asarray(edge.edge.vertices).tolist(),
-            }
-            for edge in piece.edges
-        ],
-        "cut_line": piece.cut_line.tolist(),
-        "darts": [
-            {
-                "name": dart.dart.name,
-                "left": dart.dart.left,
-                "right": dart.dart.right,
-                "tip": dart.tip.tolist(),
-                "fold": None if dart.fold is None else dart.fold.tolist(),
-                "fold_to": dart.fold_to,
-                "opening": dart.opening,
-                "pleat": dart.dart.pleat,
-                "length_mm": [1000 * piece.edge(leg).length for leg in (dart.dart.left, dart.dart.right)],
-            }
-            for dart in piece.darts
-        ],
-        "notches": [
-            {
-                "seam": notch.seam,
-                "edge": notch.edge,
-                "length": notch.length,
-                "at": notch.at.tolist(),
-                "base": [base.tolist() for base in notch.base],
-                "direction": notch.direction.tolist(),
-                "depth": notch.depth,
-                "double": notch.double,
-            }
-            for notch in piece.notches
-        ],
-        "drill_holes": [{"name": hole.name, "at": hole.at.tolist()} for hole in piece.drill_holes],
-        "internal_lines": _lists(piece.internal_lines),
-        "cutouts": _lists({name: cutout.cut_line for name, cutout in piece.cutouts.items()}),
-        "cutout_sew_lines": _lists({name: cutout.sew_line for name, cutout in piece.cutouts.items()}),
-        "cutout_allowances": {name: cutout.width for name, cutout in piece.cutouts.items()},
-        "fisheye_darts": _lists(piece.fisheyes),
-        "grain": piece.grain.tolist(),
-        "label": {
-            "at": piece.label.at.tolist(),
-            "lines": [text for text, _ in piece.label.lines],
-            "heights": [height for _, height in piece.label.lines],
-            "angle": piece.label.angle,
-            "leader": None if piece.label.leader is None else piece.label.leader.tolist(),
-        },
-        "notes": list(piece.notes),
-    }
-
-
-def _lists(lines: Mapping[str, Sequence[Any] | np.ndarray[Any, Any]]) -> dict[str, Any]:
-    return {name: np.asarray(line).tolist() for name, line in lines.items()}
+    own, label = piece.piece, piece.label
+    edges = [
+        _told(
+            EdgeEntry,
+            edge,
+            name=edge.name,
+            kind=edge.kind,
+            allowance=edge.width,
+            length=edge.length,
+            point_lengths=edge.places.tolist(),
+            mesh_vertices=None if edge.edge.vertices is None else np.asarray(edge.edge.vertices).tolist(),
+            **_told(EdgeEntry, edge.curve),
+        )
+        for edge in piece.edges
+    ]
+    darts = []
+    for dart in piece.darts:
+        lengths = [1000 * piece.edge(leg).length for leg in (dart.dart.left, dart.dart.right)]
+        darts.append({**_told(DartEntry, dart.dart), **_told(DartEntry, dart, length_mm=lengths)})
+    drafted = _told(
+        PieceEntry,
+        piece,
+        edges=edges,
+        darts=darts,
+        notches=[_told(NotchEntry, notch, double=notch.double) for notch in piece.notches],
+        cutouts={name: cutout.cut_line.tolist() for name, cutout in piece.cutouts.items()},
+        cutout_sew_lines={name: cutout.sew_line.tolist() for name, cutout in piece.cutouts.items()},
+        cutout_allowances={name: cutout.width for name, cutout in piece.cutouts.items()},
+        fisheye_darts=_plain(piece.fisheyes),
+        label=_told(
+            LabelEntry, label, lines=[t for t, _ in label.lines], heights=[height for _, height in label.lines]
+        ),
+    )
+    return _told(PieceEntry, own, marks=sorted(own.marks), printed_units=own.units, on_fold=own.on_fold, **drafted)
 
 
 def read_pattern_json(path: str | os.PathLike[str]) -> DraftedGarment:
@@ -561,107 +485,56 @@ def pattern_from_json(data: Any) -> DraftedGarment:
             size: tuple(_read_piece(name, size, piece) for name, piece in pieces.items())
             for size, pieces in data.sizes.items()
         }
-        garment = Pattern(
-            name=data.name,
-            pieces={size: tuple(piece.piece for piece in pieces) for size, pieces in drafted.items()},
-            seams=[
-                Seam(
-                    name=stitch.name,
-                    sides=(_read_side(stitch.sides[0]), _read_side(stitch.sides[1])),
-                    ease=stitch.ease,
-                    eased=(stitch.eased[0], stitch.eased[1]),
-                    openings=tuple(SeamOpening(**each.model_dump()) for each in stitch.openings),
-                )
-                for stitch in data.stitches
-                if stitch.kind == "seam"
-            ],
-            sample_size=data.sample_size,
-            words=data.words,
-            elastics=tuple(Elastic(**each.model_dump()) for each in data.elastics),
-            worn=None if data.worn is None else _read_worn(data.worn),
-            found_seams=[
-                FoundSeam(name=one.name, length=one.length_m, released=one.released_j, needed=one.needed)
-                for one in data.found_seams
-            ],
-        )
-        reports = tuple(
-            SeamReport(
-                name=seam.name,
-                size=seam.size,
-                sides=(seam.sides[0], seam.sides[1]),
-                length_mm=(seam.length_mm[0], seam.length_mm[1]),
-                ease=seam.ease,
-                difference_mm=seam.difference_mm,
-                local_mm=seam.difference_per_50mm_mm,
-                notches_mm=seam.notches_mm,
-            )
-            for seam in data.seams
-        )
+        pieces = {size: tuple(piece.piece for piece in row) for size, row in drafted.items()}
+        seams = [_read_stitch(stitch) for stitch in data.stitches if stitch.kind == "seam"]
+        reports = tuple(_made(SeamReport, report) for report in data.seams)
+        garment = _made(Pattern, data, pieces=pieces, seams=seams)
         return DraftedGarment(garment=garment, pieces=drafted, seams=reports)
     except InputError as error:
         raise InputError(f"{error}; run the scene again") from None
 
 
-def _worn(worn: Worn) -> dict[str, Any]:
-    """Return the entry of a garment as it is worn."""
-    return {
-        "views": {
-            side: [
-                {"outlines": [x.tolist() for x in each.outlines], "lines": [x.tolist() for x in each.lines]}
-                for each in row
-            ]
-            for side, row in worn.views.items()
-        },
-        "measures": {size: [asdict(each) for each in row] for size, row in worn.measures.items()},
-        "needed": [asdict(each) for each in worn.needed],
-        "knits": list(worn.knits),
-        "failing": list(worn.failing),
-        "cloths": {name: asdict(each) for name, each in worn.cloths.items()},
-        "buttonholes": worn.buttonholes,
-    }
+Thing = TypeVar("Thing")
 
 
-def _read_worn(data: WornEntry) -> Worn:
-    """Return a garment as it is worn."""
-    return Worn(
-        views={
-            side: tuple(
-                ViewedPiece(
-                    outlines=tuple(np.array(x) for x in each.outlines), lines=tuple(np.array(x) for x in each.lines)
-                )
-                for each in row
-            )
-            for side, row in data.views.items()
-        },
-        measures={size: tuple(Measure(**each.model_dump()) for each in row) for size, row in data.measures.items()},
-        needed=tuple(NeededOpening(**each.model_dump()) for each in data.needed),
-        knits=tuple(data.knits),
-        failing=tuple(data.failing),
-        cloths={
-            name: ClothKind(
-                kind=each.kind,
-                weight=each.weight,
-                stretch=(each.stretch[0], each.stretch[1]),
-                examples=tuple(each.examples),
-            )
-            for name, each in data.cloths.items()
-        },
-        buttonholes=data.buttonholes,
-    )
+_hints: Any = cache(get_type_hints)
 
 
-def _read_side(parts: Sequence[SideEntry]) -> tuple[SeamSide, ...]:
-    return tuple(
-        SeamSide(piece=p.piece, edge=p.edge, reversed=p.reversed, mirrored=p.mirrored, copy=p.copy_number)
-        for p in parts
-    )
+def _made(made: type[Thing], entry: Entry, /, **given: Any) -> Thing:
+    """Return the object that an entry tells of: the fields that both have, as their types say, and what is given."""
+    hints = _hints(made)
+    names = [name for name in type(entry).model_fields if name in hints and name not in given]
+    return made(**{name: _typed(hints[name], getattr(entry, name)) for name in names}, **given)
+
+
+def _typed(hint: Any, value: Any) -> Any:
+    """Return plain data as a type says: arrays, tuples and objects."""
+    if isinstance(hint, UnionType):
+        (hint,) = (each for each in get_args(hint) if each is not NoneType)
+    if isinstance(value, Entry):
+        return _made(hint, value)
+    if isinstance(value, dict):
+        return {key: _typed(get_args(hint)[1], each) for key, each in value.items()}
+    if not isinstance(value, list):
+        return value
+    if get_origin(hint) is np.ndarray:
+        return np.array(value)
+    rows = [_typed(get_args(hint)[0], each) for each in value]
+    return tuple(rows) if get_origin(hint) is tuple else rows
+
+
+def _read_stitch(stitch: StitchEntry) -> Seam:
+    first, second = (tuple(_made(SeamSide, side, copy=side.copy_number) for side in row) for row in stitch.sides)
+    return _made(Seam, stitch, sides=(first, second))
 
 
 def _read_piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:
     frame = np.array(data.frame)
-    darts = [
-        Dart(name=d.name, left=d.left, right=d.right, fold_to=d.fold_to or None, pleat=d.pleat) for d in data.darts
-    ]
+
+    def in_mesh(points: Any) -> FloatArray:
+        """Map points from the drafted piece's coordinates to those of the flat mesh."""
+        return (np.array(points) - frame[:, 2]) @ frame[:, :2]
+
     cutouts = {
         key: DraftedCutout(
             sew_line=np.array(data.cutout_sew_lines.get(key, line)),
@@ -670,100 +543,49 @@ def _read_piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:
         )
         for key, line in data.cutouts.items()
     }
-    fisheyes = {key: np.array(line) for key, line in data.fisheye_darts.items()}
-    internal_lines = {key: np.array(line) for key, line in data.internal_lines.items()}
-    grain = np.array(data.grain)
-    holes = [
-        Hole(name=key, points=_to_mesh(cutout.sew_line, frame), allowance=cutout.width)
-        for key, cutout in cutouts.items()
+    holes = [Hole(name=key, points=in_mesh(one.sew_line), allowance=one.width) for key, one in cutouts.items()]
+    holes += [Hole(name=key, points=in_mesh(line), kind="dart") for key, line in data.fisheye_darts.items()]
+    edges = [
+        _made(
+            Edge,
+            edge,
+            points=in_mesh(edge.line),
+            allowance=None if edge.kind == "fold" else edge.allowance,
+            vertices=None if edge.mesh_vertices is None else np.array(edge.mesh_vertices, dtype=np.int32),
+        )
+        for edge in data.edges
     ]
-    holes += [Hole(name=key, points=_to_mesh(line, frame), kind="dart") for key, line in fisheyes.items()]
-    piece = Piece(
+    darts = [_made(Dart, dart, fold_to=dart.fold_to or None) for dart in data.darts]
+    piece = _made(
+        Piece,
+        data,
         name=name,
         size=size,
-        fabric=data.fabric,
-        quantity=data.quantity,
-        role=data.role,
-        also=data.also,
-        marks={
-            hole.name: _to_mesh(np.array([hole.at]), frame)[0] for hole in data.drill_holes if hole.name in data.marks
-        },
-        paired=data.paired,
-        title=data.title,
         units=data.printed_units,
-        at=data.at,
-        placement=None if data.placement is None else np.array(data.placement),
-        levels=data.levels,
-        edges=[
-            Edge(
-                name=edge.name,
-                points=_to_mesh(np.array(edge.line), frame),
-                kind=edge.kind,
-                allowance=None if edge.kind == "fold" else edge.allowance,
-                vertices=None if edge.mesh_vertices is None else np.array(edge.mesh_vertices, dtype=np.int32),
-            )
-            for edge in data.edges
-        ],
+        edges=edges,
         darts=darts,
-        internal_lines={key: _to_mesh(line, frame) for key, line in internal_lines.items()},
-        grain=_to_mesh(grain, frame),
         holes=holes,
+        internal_lines={key: in_mesh(line) for key, line in data.internal_lines.items()},
+        marks={hole.name: in_mesh([hole.at])[0] for hole in data.drill_holes if hole.name in data.marks},
+        grain=in_mesh(data.grain),
     )
-    return DraftedPiece(
+    return _made(
+        DraftedPiece,
+        data,
         piece=piece,
-        frame=frame,
         edges=tuple(
-            DraftedEdge(
+            _made(
+                DraftedEdge,
+                entry,
                 edge=edge,
-                curve=Curve(bezier=np.array(d.bezier), straight=np.array(d.straight)),
-                line=np.array(d.line),
-                width=d.allowance,
-                places=np.array(d.point_lengths),
-                fit_error=d.fit_error,
-                tolerance=d.tolerance,
+                curve=_made(Curve, entry),
+                width=entry.allowance,
+                places=np.array(entry.point_lengths),
             )
-            for edge, d in zip(piece.edges, data.edges, strict=True)
+            for edge, entry in zip(edges, data.edges, strict=True)
         ),
-        cut_line=np.array(data.cut_line),
-        darts=tuple(
-            DraftedDart(
-                dart=dart,
-                tip=np.array(d.tip),
-                fold=None if d.fold is None else np.array(d.fold),
-                fold_to=d.fold_to,
-                opening=d.opening,
-            )
-            for dart, d in zip(darts, data.darts, strict=True)
-        ),
-        drill_holes=tuple(DrillHole(name=hole.name, at=np.array(hole.at)) for hole in data.drill_holes),
-        notches=tuple(
-            Notch(
-                seam=notch.seam,
-                edge=notch.edge,
-                length=notch.length,
-                at=np.array(notch.at),
-                base=tuple(np.array(base) for base in notch.base),
-                direction=np.array(notch.direction),
-                depth=notch.depth,
-            )
-            for notch in data.notches
-        ),
-        internal_lines=internal_lines,
+        darts=tuple(_made(DraftedDart, entry, dart=dart) for dart, entry in zip(darts, data.darts, strict=True)),
         cutouts=cutouts,
-        fisheyes=fisheyes,
-        grain=grain,
-        label=Label(
-            at=np.array(data.label.at),
-            lines=tuple(zip(data.label.lines, data.label.heights, strict=True)),
-            angle=data.label.angle,
-            leader=None if data.label.leader is None else np.array(data.label.leader),
-        ),
-        notes=tuple(data.notes),
-        enlarged=(data.enlarged[0], data.enlarged[1]),
+        fisheyes={key: np.array(line) for key, line in data.fisheye_darts.items()},
+        label=_made(Label, data.label, lines=tuple(zip(data.label.lines, data.label.heights, strict=True))),
     )
-
-
-def _to_mesh(points: FloatArray, frame: FloatArray) -> FloatArray:
-    """Map points from the drafted piece's coordinates to those of the flat mesh."""
-    turn = frame[:, :2]
-    return (points - frame[:, 2]) @ turn

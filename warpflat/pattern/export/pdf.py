@@ -21,21 +21,19 @@ from warpflat.pattern.drafting.draft import nest_label, relabelled
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.drawing import Drawing, OnPaper, Stroke, draw_nest
 from warpflat.pattern.drafting.half_pieces import halved
-from warpflat.pattern.drafting.label import BOLD, CAPITALS, FONT, Words, embedded_font, text_width
+from warpflat.pattern.drafting.label import BOLD, CAPITALS, FONT, embedded_font, text_width
 from warpflat.pattern.drafting.layout import Placed, Sheet, lay_out, nests, occupied_points
+from warpflat.pattern.drafting.polygons import mapped, upright
 from warpflat.pattern.drafting.sewing_order import seam_letters
 from warpflat.pattern.drafting.tile_nesting import nest_on_tiles
 from warpflat.pattern.drafting.words import printed_in, translate
 from warpflat.pattern.export.pdf_guide import guide_pages
 from warpflat.pattern.export.pdf_legend import draw_legend, legend_page
-from warpflat.pattern.export.pdf_tiling import LEGEND_SIZE, SIZE_COLOURS, SIZE_DASHES, Paper, Tiling, make_tiling
-from warpflat.pattern.export.svg import OF_SIZE, STYLE
+from warpflat.pattern.export.pdf_pen import POINT, draw_line, draw_words, page_footer
+from warpflat.pattern.export.pdf_tiling import LEGEND_SIZE, SIZE_DASHES, Paper, Tiling, make_tiling
+from warpflat.pattern.export.svg import OF_SIZE, SIZE_COLOURS, STYLE
 
 __all__ = ["PAPERS", "draw_sheet", "sheet_names", "too_many_sheets", "write_pdf"]
-
-
-#: Points per metre: a PDF's unit is 1/72 inch.
-POINT = 72 / 0.0254
 
 
 PAPERS = {
@@ -142,8 +140,7 @@ def _beside_on_one_sheet(place: Placed, others: Sequence[Placed], tiling: Tiling
     """Return the pieces of a place with their label, which stands beside them, moved to where one sheet shows each of its rows."""
     import shapely
 
-    corners = [tiling.corner(*tile) for tile in tiling.tiles]
-    windows = [shapely.box(*corner, *(corner + tiling.paper.step + tiling.paper.overlap)) for corner in corners]
+    windows = [tiling.window(tile) for tile in tiling.tiles]
     taken = [shapely.Polygon(place.on_sheet(piece.cut_line)) for piece in place.pieces]
     taken += [shapely.convex_hull(shapely.MultiPoint(each.on_sheet(occupied_points(each.pieces)))) for each in others]
     cloth, label = shapely.union_all(taken), nest_label(place.pieces)
@@ -194,7 +191,6 @@ def _pages(
     """
     from reportlab import rl_config
     from reportlab.pdfbase import pdfmetrics
-    from reportlab.pdfbase.pdfdoc import PDFArray, PDFDictionary, PDFName, PDFResourceDictionary, PDFString, xObjectName
     from reportlab.pdfgen.canvas import Canvas
 
     kind, stream, chosen = tiling.paper, BytesIO(), tuple(whole.pieces)
@@ -206,29 +202,7 @@ def _pages(
     canvas.setTitle(f"{whole.name}, {' / '.join(chosen)}")
     canvas.setCreator("warpflat")
     canvas.setViewerPreference("PrintScaling", "None")
-    # The whole sheet is drawn once, as a form; every page shows its part of it.
-    border, sheet = 0.05, tiling.sheet
-    low, high = np.array([-border, -3.0]), sheet.size + 3.0
-    widen = tiling.paper.line_width
-    canvas.beginForm("sheet", *(low * POINT), *(high * POINT))
-    for placed, sizes in zip(sheet.placed, drawings, strict=True):
-        nested = len(placed.pieces) > 1
-        for index, drawing in enumerate(sizes):
-            of_size: list[Stroke] = []
-            shared: list[Stroke] = []
-            for stroke in (stroke for stroke in drawing.strokes if not stroke.hidden):
-                (of_size if nested and stroke.role in OF_LAYER else shared).append(stroke)
-            for stroke in shared:
-                _stroke(canvas, stroke, placed.matrix, index if nested else None, widen)
-            if nested:
-                canvas._code.append(f"/OC /size{chosen.index(drawing.piece.size)} BDC")
-            for stroke in of_size:
-                _stroke(canvas, stroke, placed.matrix, index, widen)
-            if nested:
-                canvas._code.append("EMC")
-    if sheet.reserved is not None:
-        draw_legend(canvas, sheet.reserved, printed, chosen, tiling.paper.name)
-    canvas.endForm()
+    _sheet_form(canvas, printed, tiling, drawings, chosen)
     # Words are drawn on the sheets that show them whole; on all, if none does.
     forms = _word_forms(canvas, tiling, drawings, chosen)
     if guide:
@@ -240,49 +214,77 @@ def _pages(
         guide_pages(canvas, whole, printed, small)
         canvas.setPageSize((kind.width * POINT, kind.height * POINT))
     names = sheet_names(tiling, drawings) if tiling.joined else {}
-    for row, column in tiling.tiles:
-        title = whole.name.replace("_", " ")
-        paper = tiling.paper
-        inner = np.array([paper.width, paper.height]) - 2 * paper.margin
-        corner = tiling.corner(row, column)
+    inner = np.array([kind.width, kind.height]) - 2 * kind.margin
+    for tile in tiling.tiles:
+        corner, title = tiling.corner(*tile), tiling.name(*tile)
         canvas.saveState()
         window = canvas.beginPath()
-        window.rect(paper.margin * POINT, paper.margin * POINT, *(inner * POINT))
+        window.rect(kind.margin * POINT, kind.margin * POINT, *(inner * POINT))
         canvas.clipPath(window, stroke=0, fill=0)
-        canvas.translate(*((paper.margin - corner) * POINT))
+        canvas.translate(*((kind.margin - corner) * POINT))
         canvas.doForm("sheet")
-        canvas.doForm(forms[row, column])
+        canvas.doForm(forms[tile])
         canvas.restoreState()
-        if tiling.joined:
-            _joining_marks(canvas, tiling, row, column)
+        if tile in names:
+            _joining_marks(canvas, tiling, *tile)
             canvas.setFillColor("#bbbbbb")
             canvas.setFont(BOLD, SHEET_NAME)
-            canvas.drawString(*((names[row, column] - corner + paper.margin) * POINT), tiling.name(row, column))
-        canvas.setFillColor("#555555")
-        canvas.setFont(FONT, 7)
-        number = translate("sheet {name}", name=tiling.name(row, column))
-        page = f"{title}  -  {number}  -  {translate('{paper}, print at 100 %', paper=paper.name)}"
-        canvas.drawCentredString(paper.width / 2 * POINT, (paper.margin - 0.0055) * POINT, page)
+            canvas.drawString(*((names[tile] - corner + kind.margin) * POINT), title)
+        page_footer(canvas, whole.name, kind, translate("sheet {name}", name=title))
         canvas.showPage()
     if len(chosen) > 1:
-        # The layers of the sheet, one a size, are optional content that readers list and can hide.
-        document = canvas._doc
-        groups = {
-            f"size{k}": document.Reference(PDFDictionary({"Type": PDFName("OCG"), "Name": PDFString(f"Size {size}")}))
-            for k, size in enumerate(chosen)
-        }
-        for name in ("sheet", *forms.values()):
-            form = document.idToObject[xObjectName(name)]
-            form.Resources = PDFResourceDictionary(Properties=groups)
-            form.Resources.basicFonts()
-        order = PDFArray(list(groups.values()))
-        catalog = document.Catalog
-        catalog.OCProperties = PDFDictionary(
-            {"OCGs": order, "D": PDFDictionary({"Order": order, "ON": order, "Name": PDFString("Sizes")})}
-        )
-        catalog.__NoDefault__ = [*catalog.__NoDefault__, "OCProperties"]
+        _list_layers(canvas, chosen, ["sheet", *forms.values()])
     canvas.save()
     return stream.getvalue()
+
+
+def _sheet_form(
+    canvas: Any,
+    printed: DraftedGarment,
+    tiling: Tiling,
+    drawings: Sequence[tuple[Drawing, ...]],
+    chosen: Sequence[str],
+) -> None:
+    """Draw the whole sheet once, as a form; every page shows its part of it. What is of one size is on that size's layer."""
+    border, sheet, widen = 0.05, tiling.sheet, tiling.paper.line_width
+    low, high = np.array([-border, -3.0]), sheet.size + 3.0
+    canvas.beginForm("sheet", *(low * POINT), *(high * POINT))
+    for placed, sizes in zip(sheet.placed, drawings, strict=True):
+        nested = len(placed.pieces) > 1
+        for index, drawing in enumerate(sizes):
+            shown = [stroke for stroke in drawing.strokes if not stroke.hidden]
+            of_size = [stroke for stroke in shown if nested and stroke.role in OF_LAYER]
+            for stroke in (stroke for stroke in shown if not (nested and stroke.role in OF_LAYER)):
+                _stroke(canvas, stroke, placed.matrix, index if nested else None, widen)
+            if nested:
+                canvas._code.append(f"/OC /size{chosen.index(drawing.piece.size)} BDC")
+            for stroke in of_size:
+                _stroke(canvas, stroke, placed.matrix, index, widen)
+            if nested:
+                canvas._code.append("EMC")
+    if sheet.reserved is not None:
+        draw_legend(canvas, sheet.reserved, printed, chosen, tiling.paper.name)
+    canvas.endForm()
+
+
+def _list_layers(canvas: Any, sizes: Sequence[str], forms: Sequence[str]) -> None:
+    """Make the layers of forms, one a size, optional content that readers list and can hide."""
+    from reportlab.pdfbase.pdfdoc import PDFArray, PDFDictionary, PDFName, PDFResourceDictionary, PDFString, xObjectName
+
+    document = canvas._doc
+    groups = {
+        f"size{k}": document.Reference(PDFDictionary({"Type": PDFName("OCG"), "Name": PDFString(f"Size {size}")}))
+        for k, size in enumerate(sizes)
+    }
+    for name in forms:
+        form = document.idToObject[xObjectName(name)]
+        form.Resources = PDFResourceDictionary(Properties=groups)
+        form.Resources.basicFonts()
+    order, catalog = PDFArray(list(groups.values())), document.Catalog
+    catalog.OCProperties = PDFDictionary(
+        {"OCGs": order, "D": PDFDictionary({"Order": order, "ON": order, "Name": PDFString("Sizes")})}
+    )
+    catalog.__NoDefault__ = [*catalog.__NoDefault__, "OCProperties"]
 
 
 def _word_forms(
@@ -308,7 +310,7 @@ def _word_forms(
             words, placed, layer, index = written[k]
             colour = SIZE_COLOURS[index % len(SIZE_COLOURS)] if words.tag else "#000000"
             canvas._code += [f"/OC /{layer} BDC"] if layer else []
-            _words(canvas, words, placed.matrix, colour)
+            draw_words(canvas, words, placed.matrix, colour)
             canvas._code += ["EMC"] if layer else []
         canvas.endForm()
     return names
@@ -373,11 +375,8 @@ def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[She
         for group, shape, place in zip(groups, shapes, places, strict=True):
             quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
             turn = np.linalg.matrix_power(quarter, place.quarters)
-            corners = np.asarray(shapely.get_coordinates(shape)) @ turn.T
-            low, high = corners.min(axis=0), corners.max(axis=0)
-            matrix = np.column_stack([turn, place.corner - low])
-            box = np.stack([place.corner, place.corner + high - low])
-            placed.append(Placed(pieces=group, matrix=matrix, box=box))
+            low = (shapely.get_coordinates(shape) @ turn.T).min(axis=0)
+            placed.append(Placed(pieces=group, matrix=np.column_stack([turn, place.corner - low])))
         sheet = Sheet(placed=tuple(placed), size=size)
         return sheet, make_tiling(sheet, paper)
     if paper.endless:
@@ -410,9 +409,8 @@ def _on_pages(groups: Sequence[tuple[DraftedPiece, ...]], paper: Paper) -> Sheet
         turn = np.eye(2)
         if around.geom_type == "Polygon" and float(np.prod(np.ptp(points, axis=0))) > SLANTING * around.area:
             sides = np.diff(np.asarray(around.exterior.coords), axis=0)[:2]
-            x, y = max(sides, key=lambda side: float(np.linalg.norm(side)))
-            x, y = np.array([x, y]) / np.hypot(x, y) * (1.0 if y >= 0 else -1.0)
-            turn = np.array([[y, -x], [x, y]])
+            along = max(sides, key=lambda side: float(np.linalg.norm(side)))
+            turn = upright(along if along[1] >= 0 else -along)
         lines = [piece.cut_line @ turn.T for piece in group]
         label = nest_label(group)
         lines += [] if label.leader is None else [label.box @ turn.T]
@@ -450,10 +448,8 @@ def _on_pages(groups: Sequence[tuple[DraftedPiece, ...]], paper: Paper) -> Sheet
     }
     placed = []
     for number, group in enumerate(groups):
-        corner, low = corners_on_sheet[number], boxes[number][0]
-        matrix = np.column_stack([turns[number], corner - low])
-        box = np.stack([corner, corner + np.ptp(boxes[number], axis=0)])
-        placed.append(Placed(pieces=tuple(group), matrix=matrix, box=box))
+        matrix = np.column_stack([turns[number], corners_on_sheet[number] - boxes[number][0]])
+        placed.append(Placed(pieces=tuple(group), matrix=matrix))
     return Sheet(placed=tuple(placed), size=size, reserved=corners_on_sheet[legend])
 
 
@@ -475,38 +471,14 @@ def _stroke(canvas: Any, stroke: Stroke, matrix: FloatArray, size_index: int | N
     canvas.setLineWidth(widen * width / 1000 * POINT)
     canvas.setDash([widen * d / 1000 * POINT for d in dashes])
     canvas.setLineJoin(1)
-    path = canvas.beginPath()
-    if stroke.curve is not None:
-        control = stroke.curve.transformed(matrix).bezier * POINT
-        path.moveTo(*control[0, 0])
-        for segment in control:
-            path.curveTo(*segment[1], *segment[2], *segment[3])
-    else:
-        points = (stroke.points @ matrix[:, :2].T + matrix[:, 2]) * POINT
-        path.moveTo(*points[0])
-        for point in points[1:]:
-            path.lineTo(*point)
-        if stroke.closed:
-            path.close()
+    if stroke.curve is None:
+        draw_line(canvas, mapped(stroke.points, matrix), closed=stroke.closed)
+        return
+    path, control = canvas.beginPath(), stroke.curve.transformed(matrix).bezier * POINT
+    path.moveTo(*control[0, 0])
+    for segment in control:
+        path.curveTo(*segment[1], *segment[2], *segment[3])
     canvas.drawPath(path)
-
-
-def _words(canvas: Any, words: Words, matrix: FloatArray, colour: str) -> None:
-    """Draw one line of text, never upside down."""
-    font, size = (BOLD if words.bold else FONT), words.height / CAPITALS * POINT
-    angle = float(np.degrees(words.angle + np.arctan2(matrix[1, 0], matrix[0, 0])))
-    angle = (angle + 89.5) % 180.0 - 89.5
-    canvas.saveState()
-    canvas.translate(*((matrix[:, :2] @ words.at + matrix[:, 2]) * POINT))
-    canvas.rotate(angle)
-    if words.tag:
-        half = canvas.stringWidth(words.text, font, size) / 2 + 2
-        canvas.setFillColor("#ffffff")
-        canvas.rect(-half, -words.height * POINT * 0.75, 2 * half, words.height * POINT * 1.5, stroke=0, fill=1)
-    canvas.setFillColor(colour)
-    canvas.setFont(font, size)
-    canvas.drawCentredString(0, -words.height / 2 * POINT, words.text)
-    canvas.restoreState()
 
 
 def _joining_marks(canvas: Any, tiling: Tiling, row: int, column: int) -> None:
@@ -543,12 +515,7 @@ def _joining_marks(canvas: Any, tiling: Tiling, row: int, column: int) -> None:
             at = np.array(middle)
             first, second = sorted([(row, column), (r, c)])
             size = 0.004
-            path = canvas.beginPath()
-            path.moveTo(*((at + np.array([size, 0])) * POINT))
-            for dx, dy in ((0, size), (-size, 0), (0, -size)):
-                path.lineTo(*((at + np.array([dx, dy])) * POINT))
-            path.close()
-            canvas.drawPath(path)
+            draw_line(canvas, at + size * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]]), closed=True)
             canvas.setFillColor("#888888")
             canvas.setFont(FONT, 6)
             text = f"{tiling.name(*first)} | {tiling.name(*second)}"

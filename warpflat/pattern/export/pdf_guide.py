@@ -11,7 +11,7 @@ from warpflat.core import FloatArray, energy_words, without_side
 from warpflat.pattern.drafting.cut_list import cloths_of, cut_list
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.finished import finished_lengths
-from warpflat.pattern.drafting.label import BOLD, CAPITALS, FONT, cutting_words, printed_size, text_width, wrap_text
+from warpflat.pattern.drafting.label import CAPITALS, cutting_words, printed_size, wrap_text
 from warpflat.pattern.drafting.marker import WIDTHS, cloth_needed
 from warpflat.pattern.drafting.measures import cloth_words, length_words
 from warpflat.pattern.drafting.piece_parts import FoundSeam
@@ -19,7 +19,7 @@ from warpflat.pattern.drafting.sewing_order import SewingStep, notions, sewing_s
 from warpflat.pattern.drafting.sewing_tasks import piece_titles, techniques
 from warpflat.pattern.drafting.words import listed, translate, translate_name
 from warpflat.pattern.drafting.worn import Worn
-from warpflat.pattern.export.pdf_legend import page_footer
+from warpflat.pattern.export.pdf_pen import POINT, draw_line, page_footer, write
 
 if TYPE_CHECKING:
     from warpflat.pattern.export.pdf_tiling import Paper
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 __all__ = ["guide_pages"]
 
 
-POINT = 72 / 0.0254
 #: Size of a thumbnail [m], and how many stand in a row at most.
 THUMBNAIL, IN_ROW = (0.026, 0.034), 7
 #: Sizes whose measures stand beside each other at most.
@@ -54,10 +53,6 @@ STROKES = {
 HEADING, TEXT, LINE = 11.0, 8.0, 0.0046
 
 
-def _signed(length: float, units: str) -> str:
-    return f"{'+' if length >= 0 else '-'}{length_words(abs(length), units)}"
-
-
 class _Page:
     """A page that is filled from the top; a new one begins where there is no room left."""
 
@@ -65,6 +60,11 @@ class _Page:
         self.canvas, self.garment, self.paper = canvas, garment, paper
         self.left, self.width = paper.margin + 0.005, paper.width - 2 * paper.margin - 0.010
         self.y = paper.height - paper.margin - 0.004
+
+    def length(self, length: float, *, signed: bool = False) -> str:
+        """Return a length [m] in words, in the units of the pattern."""
+        sign = "" if not signed else "+" if length >= 0 else "-"
+        return sign + length_words(abs(length), self.garment.garment.units)
 
     def need(self, height: float) -> bool:
         """Begin a new page if less than `height` [m] is left; return whether one began."""
@@ -88,10 +88,7 @@ class _Page:
 
     def text(self, x: float, text: str, size: float = TEXT, *, bold: bool = False, width: float = 1.0) -> None:
         """Write a text at the present height, smaller if it is wider than `width` [m]."""
-        wide = text_width(text, size * CAPITALS / POINT, bold=bold)
-        self.canvas.setFillColor("#000000")
-        self.canvas.setFont(BOLD if bold else FONT, size * min(1.0, width / max(wide, 1e-9)))
-        self.canvas.drawString(x * POINT, self.y * POINT, text)
+        write(self.canvas, x, self.y, text, size, bold=bold, width=width)
 
     def paragraph(self, text: str, *, indent: float = 0.0, lead: str = "") -> None:
         """Write a text in as many lines as it takes, with a word before the first."""
@@ -129,62 +126,31 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
         paper: of the pages.
     """
     page = _Page(canvas, whole, paper)
-    size, units = whole.garment.sample, whole.garment.units
+    pattern, size = whole.garment, whole.garment.sample
     size = size if size in printed.pieces else next(iter(printed.pieces))
-    # The pieces, small, with what to cut of each.
     pieces = printed.pieces[size]
-    titles = piece_titles([piece.piece for piece in pieces])
-    if whole.garment.worn is not None:
-        worn = whole.garment.worn
-        _worn(page, worn, size, [each for each in printed.pieces if each in worn.measures], units)
+    if pattern.worn is not None:
+        _worn(page, pattern.worn, size, [each for each in printed.pieces if each in pattern.worn.measures])
     lengths = finished_lengths(whole, size)
     if lengths:
-        words = ", ".join(f"{what} {length_words(length, units)}" for what, length in lengths.items())
+        words = ", ".join(f"{what} {page.length(length)}" for what, length in lengths.items())
         page.paragraph(words, indent=0.030, lead=translate("Finished"))
     page.heading(translate("You need"), 3 * LINE)
     page.paragraph(", ".join(notions(whole, size)), indent=0.030, lead=translate("Notions"))
     page.paragraph(tools(whole, size), indent=0.030, lead=translate("Tools"))
-    _cloth(page, whole, units)
-    page.heading(translate("Cut"), THUMBNAIL[1] + 0.02)
-    highest = max(float(np.ptp(piece.cut_line, axis=0).max()) for piece in pieces)
-    scale = min(THUMBNAIL[1] / highest, 0.06)
-    in_row = -(-len(pieces) // -(-len(pieces) // IN_ROW))
-    step = page.width / max(in_row, 5)
-    for start in range(0, len(pieces), in_row):
-        row = pieces[start : start + in_row]
-        page.need(THUMBNAIL[1] + 4 * LINE)
-        top = page.y - 0.002
-        for number, piece in enumerate(row):
-            middle = page.left + (number + 0.5) * step
-            _thumbnail(page.canvas, piece, np.array([middle, top - THUMBNAIL[1] / 2]), scale)
-        page.y = top - THUMBNAIL[1] - LINE
-        for number, piece in enumerate(row):
-            lines = [
-                f"{start + number + 1}  {titles[piece.name]}",
-                cutting_words(piece.piece),
-                " / ".join(map(translate_name, cloths_of(piece))),
-            ]
-            y = page.y
-            for k, line in enumerate(lines):
-                page.text(page.left + number * step + 0.001, line, 7.5, bold=k == 0, width=step - 0.002)
-                page.y -= 0.0038
-            page.y = y
-        page.y -= 3 * 0.0038
-    widths: dict[str, list[float]] = {"seam": [], "hem": []}
+    _cloth(page, whole)
+    _pieces_to_cut(page, pieces)
+    widths: dict[str, set[float]] = {"seam": set(), "hem": set()}
     for edge in (edge for piece in pieces for edge in piece.edges if edge.kind in ("seam", "hem", "cut")):
         if edge.width > 0:
-            widths["hem" if edge.kind == "hem" else "seam"].append(round(edge.width, 4))
+            widths["hem" if edge.kind == "hem" else "seam"].add(round(edge.width, 4))
     allowances = [
-        translate(f"{kind}s {{width}}", width=listed([length_words(width, units) for width in sorted(set(row))]))
+        translate(f"{kind}s {{width}}", width=listed([page.length(width) for width in sorted(row)]))
         for kind, row in widths.items()
         if row
     ]
-    page.paragraph(
-        translate(
-            "Allowances are included: {allowances}. Lay every grain arrow along the selvedge.",
-            allowances=", ".join(allowances),
-        )
-    )
+    told = "Allowances are included: {allowances}. Lay every grain arrow along the selvedge."
+    page.paragraph(translate(told, allowances=", ".join(allowances)))
     cloths = cut_list(pieces)
     if len(cloths) > 1:
         page.heading(translate("From each cloth"), (1 + len(cloths)) * LINE)
@@ -202,24 +168,17 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     )
     for number, sewing in enumerate(sewing_steps(whole, size), 1):
         _step(page, number, sewing, [(p, sewing.sewn[p.name]) for p in whole.pieces[size] if p.name in sewing.sewn])
-    seams = sewn_seams(whole, size)
-    if seams:
+    if seams := sewn_seams(whole, size):
         page.heading(translate("Seams") + (f", {printed_size(size)}" if len(whole.pieces) > 1 else ""), 3 * LINE)
-        rows = [
-            [
-                seam.letter,
-                seam.name + (f" ({seam.count} x)" if seam.count > 1 else ""),
-                seam.sides[0],
-                length_words(seam.length_mm[0] / 1000, units),
-                seam.sides[1],
-                length_words(seam.length_mm[1] / 1000, units),
-            ]
-            for seam in seams
-        ]
+        rows = []
+        for seam in seams:
+            first, second = (page.length(length / 1000) for length in seam.length_mm)
+            name = seam.name + (f" ({seam.count} x)" if seam.count > 1 else "")
+            rows.append([seam.letter, name, seam.sides[0], first, seam.sides[1], second])
         head = ["", *(translate(word) for word in ("seam", "piece", "length", "sewn to", "length"))]
         page.table(head, rows, (0.05, 0.27, 0.24, 0.1, 0.24, 0.1))
-    if whole.garment.found_seams:
-        _prices(page, whole.garment.found_seams, units)
+    if pattern.found_seams:
+        _prices(page, pattern.found_seams)
     notes = dict.fromkeys(f"{piece.piece.printed_name}: {note}." for piece in pieces for note in piece.notes)
     if notes:
         page.heading(translate("Notes"), 3 * LINE)
@@ -228,7 +187,30 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     page.end()
 
 
-def _worn(page: _Page, worn: Worn, size: str, sizes: Sequence[str], units: str) -> None:
+def _pieces_to_cut(page: _Page, pieces: Sequence[DraftedPiece]) -> None:
+    """Draw the pieces, small, with what to cut of each."""
+    titles = piece_titles([piece.piece for piece in pieces])
+    page.heading(translate("Cut"), THUMBNAIL[1] + 0.02)
+    highest = max(float(np.ptp(piece.cut_line, axis=0).max()) for piece in pieces)
+    scale = min(THUMBNAIL[1] / highest, 0.06)
+    in_row = -(-len(pieces) // -(-len(pieces) // IN_ROW))
+    step = page.width / max(in_row, 5)
+    for start in range(0, len(pieces), in_row):
+        page.need(THUMBNAIL[1] + 4 * LINE)
+        top = page.y - 0.002
+        for number, piece in enumerate(pieces[start : start + in_row]):
+            left = page.left + number * step
+            _thumbnail(page.canvas, piece, np.array([left + 0.5 * step, top - THUMBNAIL[1] / 2]), scale)
+            cloths = " / ".join(map(translate_name, cloths_of(piece)))
+            page.y = top - THUMBNAIL[1] - LINE
+            for k, line in enumerate(
+                (f"{start + number + 1}  {titles[piece.name]}", cutting_words(piece.piece), cloths)
+            ):
+                page.text(left + 0.001, line, 7.5, bold=k == 0, width=step - 0.002)
+                page.y -= 0.0038
+
+
+def _worn(page: _Page, worn: Worn, size: str, sizes: Sequence[str]) -> None:
     """Draw the garment from the front and the back, with its measures and the openings that it needs beside it.
 
     Of several sizes the measures of each stand below, to choose one by.
@@ -245,19 +227,12 @@ def _worn(page: _Page, worn: Worn, size: str, sizes: Sequence[str], units: str) 
             centre = np.array([(widths[side].min() + widths[side].max()) / 2, low + extent / 2])
             for piece in row:
                 page.canvas.setLineJoin(1)
-                for lines, fill, width in ((piece.outlines, 1, 0.7), (piece.lines, 0, 0.45)):
+                for lines, fill, width in ((piece.outlines, True, 0.7), (piece.lines, False, 0.45)):
                     for line in lines:
                         page.canvas.setFillColor("#ffffff")
                         page.canvas.setStrokeColor("#000000")
-                        page.canvas.setLineWidth(width)
-                        placed = (middle + scale * (line - centre)) * POINT
-                        path = page.canvas.beginPath()
-                        path.moveTo(*placed[0])
-                        for point in placed[1:]:
-                            path.lineTo(*point)
-                        if fill:
-                            path.close()
-                        page.canvas.drawPath(path, stroke=1, fill=fill)
+                        placed = middle + scale * (line - centre)
+                        draw_line(page.canvas, placed, width=width, closed=fill, filled=fill)
             page.y = float(middle[1]) - scale * extent / 2 - 0.005
             page.text(float(middle[0]) - 0.010, translate(f"from the {side}"))
     page.y = top + 0.004
@@ -270,18 +245,17 @@ def _worn(page: _Page, worn: Worn, size: str, sizes: Sequence[str], units: str) 
         rows = [
             [
                 translate_name(measure.name),
-                length_words(measure.body, units),
-                length_words(measure.finished, units),
-                _signed(measure.ease, units),
+                page.length(measure.body),
+                page.length(measure.finished),
+                page.length(measure.ease, signed=True),
                 *(
-                    [_signed(measure.asked, units) if measure.misses and measure.asked is not None else ""]
-                    if missed
-                    else []
+                    [page.length(measure.asked, signed=True) if measure.misses and measure.asked is not None else ""]
+                    * missed
                 ),
             ]
             for measure in measures
         ]
-        titles = ("body", "finished", "ease", *(["asked for"] if missed else []))
+        titles = ("body", "finished", "ease", *(["asked for"] * missed))
         page.table(["", *map(translate, titles)], rows, (0.28, *(0.72 / len(titles) for _ in titles)))
     page.y -= 0.006
     for kind in worn.failing:
@@ -293,10 +267,10 @@ def _worn(page: _Page, worn: Worn, size: str, sizes: Sequence[str], units: str) 
                 translate(
                     "{ring}: {length} around, {girth} must pass ({over}); open it {depth} deep.",
                     ring=translate_name(need.ring),
-                    length=length_words(need.length, units),
-                    girth=length_words(need.girth, units),
+                    length=page.length(need.length),
+                    girth=page.length(need.girth),
                     over=translate_name(need.over),
-                    depth=length_words(need.depth, units),
+                    depth=page.length(need.depth),
                 )
             )
     elif measures:
@@ -311,9 +285,7 @@ def _worn(page: _Page, worn: Worn, size: str, sizes: Sequence[str], units: str) 
                 [
                     translate_name(name),
                     *(
-                        f"{length_words(each[name].body, units)} / {length_words(each[name].finished, units)}"
-                        if name in each
-                        else ""
+                        f"{page.length(each[name].body)} / {page.length(each[name].finished)}" if name in each else ""
                         for each in columns
                     ),
                 ]
@@ -323,7 +295,7 @@ def _worn(page: _Page, worn: Worn, size: str, sizes: Sequence[str], units: str) 
             page.table(heads, rows, (0.15, *[0.85 / SIZES_IN_ROW] * len(columns)))
 
 
-def _prices(page: _Page, found: Sequence[FoundSeam], units: str) -> None:
+def _prices(page: _Page, found: Sequence[FoundSeam]) -> None:
     """Write what each seam that was found releases, left and right together, for how much sewing."""
     groups: dict[str, list[FoundSeam]] = {}
     for seam in found:
@@ -336,7 +308,7 @@ def _prices(page: _Page, found: Sequence[FoundSeam], units: str) -> None:
         rows.append(
             [
                 translate_name(name) + (f" ({len(own)} x)" if len(own) > 1 else ""),
-                length_words(length, units),
+                page.length(length),
                 energy_words(prices[name]) if tried else translate(own[0].needed or "not tried"),
                 f"{energy_words(prices[name] / max(100.0 * length, 1e-9))}/cm" if tried else "",
             ]
@@ -364,14 +336,9 @@ def _step(page: _Page, number: int, sewing: SewingStep, pieces: Sequence[tuple[D
         style, *numbers = stroke.split(" ")
         colour, line_width, dashes = STROKES[style]
         page.canvas.setStrokeColor(colour)
-        page.canvas.setLineWidth(line_width)
         page.canvas.setDash(list(dashes))
-        points = (corner + np.array(numbers, dtype=float).reshape(-1, 2) * TECHNIQUE / BOX) * POINT
-        path = page.canvas.beginPath()
-        path.moveTo(*points[0])
-        for point in points[1:]:
-            path.lineTo(*point)
-        page.canvas.drawPath(path)
+        points = corner + np.array(numbers, dtype=float).reshape(-1, 2) * TECHNIQUE / BOX
+        draw_line(page.canvas, points, width=line_width)
     page.canvas.setDash([])
     if shown:
         room = STEP_WIDTH / STEP_PIECES
@@ -392,15 +359,7 @@ def _thumbnail(
     canvas.setDash([])
 
     def draw(points: FloatArray, width: float, *, closed: bool) -> None:
-        canvas.setLineWidth(width)
-        path = canvas.beginPath()
-        placed = (centre + scale * (points - (low + high) / 2)) * POINT
-        path.moveTo(*placed[0])
-        for point in placed[1:]:
-            path.lineTo(*point)
-        if closed:
-            path.close()
-        canvas.drawPath(path)
+        draw_line(canvas, centre + scale * (points - (low + high) / 2), width=width, closed=closed)
 
     draw(piece.cut_line, 0.7 if sewn is None else 0.4, closed=True)
     if sewn is None:
@@ -420,9 +379,10 @@ def _thumbnail(
     canvas.setDash([])
 
 
-def _cloth(page: _Page, whole: DraftedGarment, units: str) -> None:
+def _cloth(page: _Page, whole: DraftedGarment) -> None:
     """Write how much cloth each size takes at the usual widths."""
     page.heading(translate("Cloth needed"), 3 * LINE)
+    units = whole.garment.units
     head = ["", *(translate("{width} wide", width=cloth_words(width, units, of_width=True)) for width in WIDTHS)]
     needed = cloth_needed(whole)
     fabrics = dict.fromkeys(fabric for cloths in needed.values() for fabric in cloths)

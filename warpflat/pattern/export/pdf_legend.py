@@ -3,30 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from warpflat.core import FloatArray
 from warpflat.pattern.drafting.drafted import DraftedGarment
-from warpflat.pattern.drafting.label import BOLD, CAPITALS, FONT, printed_size, text_width
+from warpflat.pattern.drafting.label import FONT, printed_size
 from warpflat.pattern.drafting.layout import Sheet
+from warpflat.pattern.drafting.measures import INCH
 from warpflat.pattern.drafting.placement import fit_label
 from warpflat.pattern.drafting.sewing_tasks import piece_titles
 from warpflat.pattern.drafting.words import translate
-from warpflat.pattern.export.pdf_tiling import LEGEND_SIZE
-from warpflat.pattern.export.svg import STYLE
+from warpflat.pattern.export.pdf_pen import POINT, draw_line, draw_words, page_footer, write
+from warpflat.pattern.export.pdf_tiling import LEGEND_SIZE, SIZE_DASHES
+from warpflat.pattern.export.svg import SIZE_COLOURS, STYLE
 
 if TYPE_CHECKING:
-    from warpflat.pattern.export.pdf_tiling import Paper, Tiling
+    from warpflat.pattern.export.pdf_tiling import Tiling
 
-__all__ = ["TEST_INCHES", "TEST_MM", "draw_legend", "legend_page", "page_footer"]
+__all__ = ["TEST_INCHES", "TEST_MM", "draw_legend", "legend_page"]
 
 
-#: Sides of the test squares: 50 mm and 1 inch [m].
-TEST_MM, TEST_INCHES = 0.050, 0.0254
-
-POINT = 72 / 0.0254
+#: Sides of the test squares [m].
+TEST_MM, TEST_INCHES = 0.050, INCH
 #: Height of capitals [m] of the names in the overview.
 NAME_HEIGHT = 0.00155
 
@@ -46,8 +47,6 @@ _KEY = (
 
 def draw_legend(canvas: Any, at: FloatArray, garment: DraftedGarment, sizes: Sequence[str], paper: str) -> None:
     """Draw title, both test squares, the request not to scale, and the key, in a block whose lower left is `at` [m]."""
-    from warpflat.pattern.export.pdf_tiling import SIZE_COLOURS, SIZE_DASHES
-
     x, top = float(at[0]), float(at[1]) + LEGEND_SIZE[1]
     _text(canvas, x, top - 0.008, garment.name.replace("_", " "), 18, bold=True)
     if any(sizes):
@@ -126,13 +125,7 @@ def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], shee
     for number, placed in enumerate(sheet.placed, 1):
         for piece in placed.pieces:
             for line in (piece.cut_line, *(cutout.cut_line for cutout in piece.cutouts.values())):
-                points = (origin + scale * placed.on_sheet(line)) * POINT
-                path = canvas.beginPath()
-                path.moveTo(*points[0])
-                for point in points[1:]:
-                    path.lineTo(*point)
-                path.close()
-                canvas.drawPath(path)
+                draw_line(canvas, origin + scale * placed.on_sheet(line), closed=True)
         _name(canvas, sheet, number, origin, scale)
     page_footer(canvas, garment.name, paper, translate("print this page first and measure both squares"))
     canvas.showPage()
@@ -155,23 +148,9 @@ def _name(canvas: Any, sheet: Sheet, number: int, origin: FloatArray, scale: flo
             break
     else:
         return
-    canvas.setFillColor("#000000")
     for words in label.words():
-        canvas.saveState()
-        canvas.translate(*((origin + scale * words.at) * POINT))
-        canvas.rotate(np.degrees(words.angle))
-        size = words.height * scale * POINT / CAPITALS
-        canvas.setFont(FONT, size)
-        canvas.drawCentredString(0, -words.height * scale * POINT / 2, words.text)
-        canvas.restoreState()
-
-
-def page_footer(canvas: Any, name: str, paper: Paper, words: str) -> None:
-    """Write what a page is of at its foot."""
-    canvas.setFillColor("#555555")
-    canvas.setFont(FONT, 7)
-    line = f"{name.replace('_', ' ')}  -  {words}  -  {translate('{paper}, print at 100 %', paper=paper.name)}"
-    canvas.drawCentredString(paper.width / 2 * POINT, (paper.margin - 0.0055) * POINT, line)
+        small = replace(words, height=words.height * scale, bold=False)
+        draw_words(canvas, small, np.column_stack([scale * np.eye(2), origin]))
 
 
 def _square(canvas: Any, x: float, y: float, side: float, text: str) -> None:
@@ -196,7 +175,4 @@ def _sample(canvas: Any, x: float, y: float, colour: str, width: float, dashes: 
 
 def _text(canvas: Any, x: float, y: float, text: str, size: float, *, bold: bool = False) -> None:
     """Write a text, smaller where it would be wider than the legend."""
-    wide = text_width(text, size * CAPITALS / POINT, bold=bold)
-    canvas.setFillColor("#000000")
-    canvas.setFont(BOLD if bold else FONT, size * min(1.0, LEGEND_SIZE[0] / max(wide, 1e-9)))
-    canvas.drawString(x * POINT, y * POINT, text)
+    write(canvas, x, y, text, size, bold=bold, width=LEGEND_SIZE[0])

@@ -10,11 +10,12 @@ import numpy as np
 from warpflat.core import FloatArray
 from warpflat.pattern.drafting.draft import nest_label
 from warpflat.pattern.drafting.layout import Sheet
+from warpflat.pattern.drafting.words import letters_of
 
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon
 
-__all__ = ["LEGEND_SIZE", "SIZE_COLOURS", "SIZE_DASHES", "Paper", "Tiling", "make_tiling"]
+__all__ = ["LEGEND_SIZE", "SIZE_DASHES", "Paper", "Tiling", "make_tiling"]
 
 #: Dashes [mm] by which sizes are told apart on paper, also without colour.
 SIZE_DASHES: tuple[tuple[float, ...], ...] = (
@@ -26,9 +27,6 @@ SIZE_DASHES: tuple[tuple[float, ...], ...] = (
     (6, 1.5, 1, 1.5, 1, 1.5),
     (14, 3),
 )
-
-
-SIZE_COLOURS = ("#000000", "#0060a8", "#b8460b", "#5b2a86", "#00766c", "#8a6d00", "#9b1b5a")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,18 +100,19 @@ class Tiling:
         """What no sheet shows, around all that is shown."""
         import shapely
 
-        corners = [self.corner(*tile) for tile in self.tiles]
-        shown = shapely.union_all([shapely.box(*at, *(at + self.paper.step + self.paper.overlap)) for at in corners])
+        shown = shapely.union_all([self.window(tile) for tile in self.tiles])
         return shown.buffer(0.1, join_style="mitre").difference(shown)
+
+    def window(self, tile: tuple[int, int]) -> Polygon:
+        """Return what a tile shows of the sheet."""
+        import shapely
+
+        corner = self.corner(*tile)
+        return shapely.box(*corner, *(corner + self.paper.step + self.paper.overlap))
 
     def name(self, row: int, column: int) -> str:
         """Return the name of a tile, such as "B3" for the second row and the third column."""
-        letters = ""
-        row += 1
-        while row:
-            row, digit = divmod(row - 1, 26)
-            letters = chr(ord("A") + digit) + letters
-        return f"{letters}{column + 1}"
+        return f"{letters_of(row)}{column + 1}"
 
 
 #: Width and height [m] of the legend's block.
@@ -140,10 +139,10 @@ def make_tiling(sheet: Sheet, paper: Paper) -> Tiling:
     # Lines are drawn with their middle on the border.
     drawn = shapely.union_all([shape.buffer(LINE) for shape in shapes])
     tiles = [(row, column) for row in range(tiling.rows) for column in range(tiling.columns)]
-    parts = {tile: drawn.intersection(_window(tiling, tile)) for tile in tiles}
+    parts = {tile: drawn.intersection(tiling.window(tile)) for tile in tiles}
     kept = {tile for tile, part in parts.items() if part.area > 0.0}
     for tile in sorted(kept, key=lambda tile: (parts[tile].area, tile)):
-        around = [_window(tiling, other) for other in kept - {tile} if max(np.abs(np.subtract(other, tile))) == 1]
+        around = [tiling.window(other) for other in kept - {tile} if max(np.abs(np.subtract(other, tile))) == 1]
         if parts[tile].difference(shapely.union_all(around)).area < 1e-9:
             kept.remove(tile)
     shown = tuple(tile for tile in tiles if tile in kept)
@@ -153,11 +152,3 @@ def make_tiling(sheet: Sheet, paper: Paper) -> Tiling:
     return replace(
         tiling, tiles=shown, joined=any(sum(cell.intersects(shape) for cell in cells) > 1 for shape in shapes)
     )
-
-
-def _window(tiling: Tiling, tile: tuple[int, int]) -> Polygon:
-    """Return what a tile shows of the sheet."""
-    import shapely
-
-    corner = tiling.corner(*tile)
-    return shapely.box(*corner, *(corner + tiling.paper.step + tiling.paper.overlap))

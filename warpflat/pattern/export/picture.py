@@ -13,6 +13,7 @@ import numpy as np
 from warpflat.core import FloatArray, IntArray
 from warpflat.flat import Surface, join_surfaces
 from warpflat.pattern.drafting.placement import LabelRoom, Spot
+from warpflat.pattern.drafting.polygons import rotation
 from warpflat.pattern.export.colours import DRAFTED_CLOTH, SMALLEST_SCALE, Scale, energy_scale
 from warpflat.pattern.export.dressed import Body, dress
 from warpflat.pattern.export.figure import GRAIN, GREY, INK, LABEL_SIZE, MARGIN, PAGE_WIDTH, Pen, drawn_page
@@ -486,8 +487,7 @@ def _grain(
     length = float(np.linalg.norm(along))
     if not length > 0.0:
         return True
-    turn = np.radians(grain_angle)
-    along = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]) @ (along / length)
+    along = rotation(np.radians(grain_angle)) @ (along / length)
     along *= 1.0 if along[1] >= 0 else -1.0
     across = np.array([along[1], -along[0]])
     text_width, text_height = pen.measure("grain", LABEL_SIZE)

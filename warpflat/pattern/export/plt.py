@@ -43,12 +43,8 @@ def write_plt(
     Raises:
         InputError: an unknown size.
     """
-    for size in sizes or ():
-        garment.garment.check_size(size)
-    chosen = tuple(size for size in garment.pieces if sizes is None or size in sizes)
-    groups = list(filter(None, (tuple(p for p in nest if p.size in chosen) for nest in nests(garment))))
     written: dict[int, list[str]] = {pen: [] for pen in (_MARKS, 2, 1)}
-    for placed in lay_out(groups, width=width).placed:
+    for placed in lay_out(nests(garment, sizes), width=width).placed:
         with printed_in(garment.garment.words):
             drawings = draw_nest(placed.pieces)
         for drawing in drawings:

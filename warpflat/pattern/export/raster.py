@@ -15,7 +15,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.core import FloatArray, IntArray, launch_quietly, start_warp
+from warpflat.core import FloatArray, IntArray, launch_quietly, start_warp, unit
 from warpflat.kernels.raster import put_nearest, shade_pixels
 
 __all__ = ["Samples", "rasterise", "shade"]
@@ -96,7 +96,7 @@ def shade(
     rows, columns = (size // per_pixel for size in samples.front.shape)
     pixels = np.zeros((rows, columns, 4), dtype=np.uint8)
     directions = np.zeros((1, 3)) if normals is None else normals
-    light = np.asarray(LIGHT) / np.linalg.norm(LIGHT)
+    light = unit(np.array(LIGHT))
     inputs = [
         _shared(samples.triangle, wp.int32),
         per_pixel,

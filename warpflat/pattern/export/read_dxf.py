@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
@@ -15,6 +14,8 @@ import numpy as np
 
 from warpflat.core import FARTHEST, FloatArray, InputError, Place, find_unused_name, plain_label, quote_value, reading
 from warpflat.pattern.drafting.corners import find_corners
+from warpflat.pattern.drafting.curves import CHORD
+from warpflat.pattern.drafting.measures import INCH
 from warpflat.pattern.drafting.outline_edges import (
     boundary_edges,
     chain_edges,
@@ -27,23 +28,24 @@ from warpflat.pattern.drafting.pieces import Pattern, Piece
 from warpflat.pattern.drafting.seam_words import seams_of_words
 from warpflat.pattern.export.outlines import (
     MEET,
+    MOST_POINTS,
+    TOO_MANY,
     DrawnLine,
+    boundary_pieces,
+    by_size,
     close_lines,
     counted,
     find_outlines,
     left_out,
+    read_quantity,
     simple_ring,
 )
 
-__all__ = ["MOST_POINTS", "read_dxf", "read_quantity"]
+__all__ = ["read_dxf"]
 
-# Curves are flattened to within this [m].
-_FLAT = 2e-5
-#: Points of a drawing, at most: a pattern of several sizes has some ten thousand.
-MOST_POINTS = 1_000_000
-_METRES = {"METRIC": 1e-3, "ENGLISH": 0.0254}
+_METRES = {"METRIC": 1e-3, "ENGLISH": INCH}
 # The header's $INSUNITS, where no text names the units: inches, feet, millimetres, centimetres, metres.
-_METRES_OF_HEADER = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0}
+_METRES_OF_HEADER = {1: INCH, 2: 12 * INCH, 4: 1e-3, 5: 1e-2, 6: 1.0}
 # Layers of AAMA and ASTM; what is drawn on the others belongs to a piece, or checks it.
 _BOUNDARY, _FOLD, _GRAIN, _INNER, _SEWING = "1", "6", "7", "8", "14"
 # The layers of a piece that are not read, and what lies on them.
@@ -139,9 +141,7 @@ def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) ->
             notes.append(f"what belongs to pieces and is not read: {counted(unread)}")
         if kinds := [kind for block in (style, *blocks) for kind in block.unread]:
             notes.append(f"what is no line was left out: {counted(kinds)}")
-        sizes: dict[str, list[Piece]] = {}
-        for piece in pieces:
-            sizes.setdefault(piece.size, []).append(piece)
+        sizes = by_size(pieces)
         if "" in sizes and len(sizes) > 1:
             # A piece without a size is cut for all.
             for piece in sizes.pop(""):
@@ -160,11 +160,6 @@ def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) ->
             if len(own) < len(sizes):
                 notes.append(f"piece {quote_value(name)} is in size {', '.join(own)} only")
         return replace(pattern, notes=notes)
-
-
-def read_quantity(text: str) -> int:
-    """Return how often a piece is cut, as a file has it; 1 where it is no number from 1 to 999."""
-    return int(text) if re.fullmatch(r"\s*0*[1-9][0-9]{0,2}\s*", text) else 1
 
 
 def _words(entities: Iterable[Any]) -> Iterator[str]:
@@ -195,7 +190,7 @@ def _read_block(name: str, entities: Iterable[Any], insert: Any, metres: float, 
         place.at = f"{kind} on layer {quote_value(layer)}"
         found.count += 1
         if found.count > most:
-            raise InputError(f"the drawing has more than {MOST_POINTS:,} points; leave out all but the pattern")
+            raise InputError(TOO_MANY)
         if kind in _WORDS:
             at = np.array(tuple(entity.dxf.location if kind == "POINT" else entity.dxf.insert)[:2]) @ turn
             if not np.isfinite(at).all():
@@ -238,10 +233,10 @@ def _line(entity: Any, turn: FloatArray, metres: float, most: int) -> DrawnLine 
         raise InputError(f"reaches farther than {FARTHEST:g} m, or has a coordinate that is no number")
     # At once all points of a curve would take gigabytes.
     scale = float(np.sqrt(np.abs(np.linalg.det(turn))))
-    flat = islice(path.flattening(_FLAT / scale), most + 1)
+    flat = islice(path.flattening(CHORD / scale), most + 1)
     points = np.array([tuple(point)[:2] for point in flat]).reshape(-1, 2) @ turn
     if len(points) > most:
-        raise InputError(f"the drawing has more than {MOST_POINTS:,} points; leave out all but the pattern")
+        raise InputError(TOO_MANY)
     points = points[np.linalg.norm(np.diff(points, axis=0, prepend=np.inf), axis=1) > 1e-9]
     closed = len(points) > 2 and bool(np.linalg.norm(points[0] - points[-1]) < MEET)
     points = points[:-1] if closed else points
@@ -347,12 +342,7 @@ def _loose_pieces(
     if taken and not style.drawn:
         notes += [left_out([ring.name for ring in found], "closed line", " beside the blocks")] if found else []
         return []
-    pieces = list[Piece]()
-    for number, ring in enumerate(found, start=1):
-        name = find_unused_name(f"piece_{number}", {other for _, other in taken})
-        taken.add(("", name))
-        pieces.append(Piece(name=name, edges=boundary_edges(ring.points, allowance, f"{path}: {name}")))
-    return pieces
+    return boundary_pieces(found, allowance, path, {name for _, name in taken})
 
 
 def _fold(block: _Block) -> FloatArray | None:

@@ -16,6 +16,7 @@ from warpflat.core import FloatArray, InputError, check_table, nearest, polyline
 from warpflat.pattern.drafting.curves import Curve, as_cubic
 from warpflat.pattern.drafting.piece_parts import Dart, Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern.drafting.polygons import signed_area
 from warpflat.pattern.drafting.seam_difference import SEAM_TOLERANCE
 from warpflat.pattern.export.pattern_json import Coordinate, Ends, Entry, Name, Point, Text
 
@@ -258,8 +259,7 @@ def _read_panel(key: str, entry: PanelEntry, properties: PropertiesEntry) -> _Pa
     # A label says on which part of the body a panel is; else its name does.
     words = re.split(r"[^a-z]+", (entry.label or key).lower())
     on_arm = any(word.startswith(("sleeve", "arm")) for word in words) or {"sl", "cuff"} <= set(words)
-    x, y = ring.T
-    flip = np.diag([-1.0 if x @ np.roll(y, -1) < y @ np.roll(x, -1) else 1.0, 1.0])
+    flip = np.diag([-1.0 if signed_area(ring) < 0.0 else 1.0, 1.0])
     # Of the four ways to stand the one whose height rises most, or on an arm, whose sleeve may lie, comes nearest to the shoulder.
     up = np.array([0.0, 1.0, 0.0])
     if on_arm:
@@ -348,10 +348,8 @@ def _find_darts(panel: _Panel, partners: Partners) -> None:
     """Find the darts of a panel: from each dent outwards as far as edges on both sides are stitched to each other."""
     count = len(panel.lines)
     for tip in range(count):
-        into, out = (
-            panel.lines[tip][-1] - panel.lines[tip][-2],
-            panel.lines[(tip + 1) % count][1] - panel.lines[tip][-1],
-        )
+        (before_tip, at_tip), after_tip = panel.lines[tip][-2:], panel.lines[(tip + 1) % count][1]
+        into, out = at_tip - before_tip, after_tip - at_tip
         if into[0] * out[1] - into[1] * out[0] >= 0.0:
             continue
         left, right = list[int](), list[int]()

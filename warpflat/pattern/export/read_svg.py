@@ -15,30 +15,38 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from warpflat.core import FARTHEST, FloatArray, InputError, find_unused_name, quote_value, reading
-from warpflat.pattern.drafting.curves import as_cubic, cubic_weights
+from warpflat.pattern.drafting.curves import CHORD, as_cubic, cubic_weights
 from warpflat.pattern.drafting.outline_edges import (
-    boundary_edges,
     chain_edges,
     find_darts,
     split_outline,
     with_drawn_allowances,
 )
 from warpflat.pattern.drafting.pieces import Pattern, Piece
+from warpflat.pattern.drafting.polygons import mapped
 from warpflat.pattern.drafting.seam_words import seams_of_words
-from warpflat.pattern.export.outlines import MEET, DrawnLine, counted, find_outlines
-from warpflat.pattern.export.read_dxf import MOST_POINTS, read_quantity
+from warpflat.pattern.export.outlines import (
+    MEET,
+    MOST_POINTS,
+    TOO_MANY,
+    DrawnLine,
+    boundary_pieces,
+    by_size,
+    counted,
+    find_outlines,
+    read_quantity,
+)
 
 __all__ = ["read_svg"]
 
 _MILLIMETRES = {"": 25.4 / 96, "px": 25.4 / 96, "mm": 1.0, "cm": 10.0, "in": 25.4, "pt": 25.4 / 72, "pc": 25.4 / 6}
 _LENGTH = re.compile(r"\s*([0-9.eE+-]*[0-9.])\s*([a-z]*)\s*")
 _TRANSFORM = re.compile(r"(\w+)\s*\(([^)]*)\)")
-# Chords lie so near to their curve [m], and are at most so many.
-_FLAT, _MOST_CHORDS = 2e-5, 1000
+# The chords of a curve are at most so many.
+_MOST_CHORDS = 1000
 _KINDS = {"sew": "seam", "hem": "hem", "fold": "fold", "dart": "dart"}
 # Groups in each other and elements of a file, and letters of an entity, as drawing programs write for namespaces, at most.
 _DEEPEST, _MOST_ELEMENTS, _LONGEST_ENTITY = 100, 200_000, 100
-_TOO_MANY = f"the drawing has more than {MOST_POINTS:,} points; leave out all but the pattern"
 # How FreeSewing calls the group of a piece, and the classes of its outlines.
 _STACK, _CLOTHS = "fs-stack-", {"fabric", "lining", "interfacing", "canvas", "contrast"}
 _LABEL, _GROUPMODE = (f"{{http://www.inkscape.org/namespaces/inkscape}}{word}" for word in ("label", "groupmode"))
@@ -117,19 +125,13 @@ def read_svg(path: str | os.PathLike[str], *, allowance: float | None = None) ->
                 place.at = f"{element.tag.rpartition('}')[2]} {quote_value(element.get('id', ''))}"
                 lines += drawing.lines(element, matrix)
             place.at = ""
-            taken = set[str]()
             rings, notes = find_outlines(lines, str(path), page=sides)
-            for number, ring in enumerate(rings, start=1):
-                name = find_unused_name(ring.name or f"piece_{number}", taken)
-                taken.add(name)
-                pieces.append(Piece(name=name, edges=boundary_edges(ring.points, allowance, f"{path}: {name}")))
+            pieces = boundary_pieces(rings, allowance, str(path), set())
         if not pieces:
             raise InputError(f"{path}: has no closed path; a piece is a closed path")
         if drawing.unread and not groups:
             notes.append(f"what is no line, or is hidden, was left out: {counted(drawing.unread)}")
-        sizes: dict[str, list[Piece]] = {}
-        for piece in pieces:
-            sizes.setdefault(piece.size, []).append(piece)
+        sizes = by_size(pieces)
         return Pattern(
             name=path.stem, pieces=sizes, seams=seams_of_words(words.get(next(iter(sizes)), [])), notes=notes
         )
@@ -292,7 +294,7 @@ class _Drawing:
         lines, alone = list[DrawnLine](), len(found) == 1
         for points, closed in found:
             points = points[np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-9])]
-            points = points @ matrix[:, :2].T + matrix[:, 2]
+            points = mapped(points, matrix)
             if not np.abs(points).max() < FARTHEST:
                 raise InputError(
                     f"{_tag(element)} reaches farther than {FARTHEST:g} m, or has a coordinate that is no number"
@@ -301,7 +303,7 @@ class _Drawing:
                 points, closed = points[:-1], True
             self._points += len(points)
             if self._points > MOST_POINTS:
-                raise InputError(_TOO_MANY)
+                raise InputError(TOO_MANY)
             if len(points) > 1:
                 group = self._group.get(id(element), "")
                 hand = alone and _by_hand(element)
@@ -440,7 +442,7 @@ def _path_data(element: ET.Element) -> str:
 
 
 def _flatten(text: str, scale: float) -> Iterator[tuple[FloatArray, bool]]:
-    """Yield the lines of path data, whose unit is so long [m], curves within `_FLAT` of their chords."""
+    """Yield the lines of path data, whose unit is so long [m], curves within `CHORD` of their chords."""
     from fontTools.pens.recordingPen import RecordingPen  # type: ignore[import-untyped]
     from fontTools.svgLib.path import parse_path  # type: ignore[import-untyped]
 
@@ -455,10 +457,10 @@ def _flatten(text: str, scale: float) -> Iterator[tuple[FloatArray, bool]]:
         if command in ("curveTo", "qCurveTo"):
             curve = as_cubic(np.array([points[-1][-1], *control]))
             bend = scale * float(np.linalg.norm(np.diff(curve, n=2, axis=0), axis=1).max())
-            pieces = int(np.clip(np.ceil(np.sqrt(0.75 * bend / _FLAT)), 1, _MOST_CHORDS)) if bend < FARTHEST else 1
+            pieces = int(np.clip(np.ceil(np.sqrt(0.75 * bend / CHORD)), 1, _MOST_CHORDS)) if bend < FARTHEST else 1
         count += pieces
         if count > MOST_POINTS:
-            raise InputError(_TOO_MANY)
+            raise InputError(TOO_MANY)
         if command == "moveTo":
             points = [control[0][None]]
         elif command == "lineTo":

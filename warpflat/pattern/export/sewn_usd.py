@@ -65,26 +65,22 @@ def write_sewn_usd(
     st.SetIndices(Vt.IntArray.FromNumpy(np.ascontiguousarray(flat_faces[used], dtype=np.int32)))
     st.GetAttr().SetCustomDataByKey("unit", "mm")
     define_subsets(mesh, "piece", {name: np.arange(rows.start, rows.stop) for name, rows in pieces.items()})
-    seams = _seam_edges(faces, flat_faces)
-    mesh.CreateCreaseIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(seams.ravel(), dtype=np.int32)))
-    mesh.CreateCreaseLengthsAttr(Vt.IntArray([2] * len(seams)))
-    mesh.CreateCreaseSharpnessesAttr(Vt.FloatArray([_SHARP] * len(seams)))
-    export_stage(stage, path)
-
-
-def _seam_edges(faces: IntArray, flat_faces: IntArray) -> IntArray:
-    """Return the edges (#S by 2) of a sewn mesh that are two edges in the plane."""
+    # Edges of the sewn mesh that are two edges in the plane.
     sewn, plane = list[IntArray](), list[IntArray]()
     corners = np.where(faces[:, 3] >= 0, 4, 3)
     for count in (3, 4):
-        rows = corners == count
+        alike = corners == count
         for k in range(count):
-            sewn.append(faces[rows][:, [k, (k + 1) % count]])
-            plane.append(flat_faces[rows][:, [k, (k + 1) % count]])
+            sewn.append(faces[alike][:, [k, (k + 1) % count]])
+            plane.append(flat_faces[alike][:, [k, (k + 1) % count]])
     edges, ends = np.concatenate(sewn), np.concatenate(plane)
     turned = edges[:, 0] > edges[:, 1]
     edges[turned], ends[turned] = edges[turned][:, ::-1], ends[turned][:, ::-1]
     # An edge of a seam has faces on both sides, which meet in space and not in the plane.
     both, first, place = np.unique(edges, axis=0, return_index=True, return_inverse=True)
     apart = (ends != ends[first[place.ravel()]]).any(axis=1)
-    return np.asarray(both[np.unique(place.ravel()[apart])], dtype=np.int32)
+    seams = both[np.unique(place.ravel()[apart])]
+    mesh.CreateCreaseIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(seams.ravel(), dtype=np.int32)))
+    mesh.CreateCreaseLengthsAttr(Vt.IntArray([2] * len(seams)))
+    mesh.CreateCreaseSharpnessesAttr(Vt.FloatArray([_SHARP] * len(seams)))
+    export_stage(stage, path)

@@ -15,10 +15,11 @@ from warpflat.pattern.drafting.drawing import Drawing, Stroke, draw_nest, grain_
 from warpflat.pattern.drafting.label import CAPITALS, LEADING, Words, text_width
 from warpflat.pattern.drafting.layout import lay_out, nests
 from warpflat.pattern.drafting.marker import Copy, Marker
+from warpflat.pattern.drafting.polygons import mapped
 from warpflat.pattern.drafting.seam_words import seam_words
 from warpflat.pattern.drafting.words import printed_in
 
-__all__ = ["OF_SIZE", "STYLE", "SvgPage", "write_marker_svg", "write_svg"]
+__all__ = ["OF_SIZE", "SIZE_COLOURS", "STYLE", "SvgPage", "write_marker_svg", "write_svg"]
 
 
 #: Stroke colour, width [mm], dashes [mm] by role; shared with the PDF.
@@ -37,6 +38,8 @@ STYLE: dict[str, tuple[str, float, tuple[float, ...]]] = {
     "cutout": ("#000000", 0.5, ()),
     "leader": ("#7a7a7a", 0.2, ()),
 }
+#: Colours by which the sizes of a nest are told apart, legible on paper and without red-green vision; shared with the PDF.
+SIZE_COLOURS = ("#000000", "#0060a8", "#b8460b", "#5b2a86", "#00766c", "#8a6d00", "#9b1b5a", "#555555")
 #: Roles whose strokes have the colour of their size in a nest.
 OF_SIZE = ("cut", "dart", "notch")
 # Roles of the edges that may be sewn.
@@ -65,12 +68,9 @@ def write_svg(
             displayed.
         width: of the sheet [m].
     """
-    for size in sizes or ():
-        garment.garment.check_size(size)
-    chosen = tuple(size for size in garment.pieces if sizes is None or size in sizes)
-    groups = list(filter(None, (tuple(p for p in nest if p.size in chosen) for nest in nests(garment))))
+    groups = nests(garment, sizes)
     if not nested:
-        groups = [(piece,) for size in chosen for nest in groups for piece in nest if piece.size == size]
+        groups = [(piece,) for size in garment.pieces for nest in groups for piece in nest if piece.size == size]
     sheet = lay_out(groups, width=width)
     page = SvgPage(float(sheet.size[0]), float(sheet.size[1]), garment.name)
     seams = seam_words(garment.garment.seams)
@@ -110,9 +110,6 @@ def write_marker_svg(marker: Marker, path: str | os.PathLike[str]) -> None:
 class SvgPage:
     """One SVG document whose user unit is the millimetre; y runs downwards in it, so heights are turned over."""
 
-    #: Colours by which the sizes of a nest are told apart, legible on paper and without red-green vision.
-    SIZES = ("#000000", "#0060a8", "#b8460b", "#5b2a86", "#00766c", "#8a6d00", "#9b1b5a", "#555555")
-
     def __init__(self, width: float, height: float, title: str) -> None:
         """Open a page of `width` by `height` metres."""
         self.height = height * 1000
@@ -151,7 +148,7 @@ class SvgPage:
         key = self._id(f"{piece.name}-{piece.size}" if piece.size else piece.name)
         about = {"data-piece": piece.name, "data-size": piece.size, "data-quantity": str(piece.piece.quantity)}
         group = ET.SubElement(self.root, "g", {"id": key, **about})
-        colour = None if hue is None else self.SIZES[hue % len(self.SIZES)]
+        colour = None if hue is None else SIZE_COLOURS[hue % len(SIZE_COLOURS)]
         for stroke in drawing.strokes:
             self.stroke(group, stroke, key, matrix, colour)
             if stroke.role in _SEWN and (sewn := (seams or {}).get((piece.name, stroke.name))):
@@ -183,7 +180,7 @@ class SvgPage:
                     text.append("C" + " ".join(_pair(p) for p in segment[1:]))
             attributes["d"] = " ".join(text)
         else:
-            points = self._page(stroke.points @ matrix[:, :2].T + matrix[:, 2])
+            points = self._page(mapped(stroke.points, matrix))
             attributes["d"] = "M" + " L".join(_pair(p) for p in points) + (" Z" if stroke.closed else "")
         ET.SubElement(parent, "path", attributes)
 
@@ -192,7 +189,7 @@ class SvgPage:
     ) -> None:
         """Add one line of text, centred on its place."""
         matrix = np.eye(2, 3) if matrix is None else matrix
-        x, y = self._page((words.at @ matrix[:, :2].T + matrix[:, 2])[None])[0]
+        x, y = self._page(mapped(words.at[None], matrix))[0]
         height = words.height * 1000
         turn = -np.degrees(words.angle + np.arctan2(matrix[1, 0], matrix[0, 0]))
         attributes = {

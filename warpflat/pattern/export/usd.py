@@ -67,7 +67,7 @@ class FramePiece:
         width = float(np.clip(0.004 * size, 1e-5, 2e-3))
 
         def lines(below: str, colour: tuple[float, float, float]) -> SampledLines:
-            return SampledLines(stage, part_path(path, below), start=FIRST_FRAME, width=width, colour=colour)
+            return SampledLines(stage, part_path(path, below), width=width, colour=colour)
 
         default = Usd.TimeCode.Default()
         normals = vertex_normals(surface.vertices, triangulate(surface.faces)[0])

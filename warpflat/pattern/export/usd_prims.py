@@ -290,11 +290,10 @@ class MeshSamples:
 class SampledLines:
     """A group of named polylines along a mesh, each a BasisCurves prim that is shown only while it exists."""
 
-    def __init__(self, stage: Any, path: str, *, start: float, width: float, colour: Sequence[float]) -> None:
+    def __init__(self, stage: Any, path: str, *, width: float, colour: Sequence[float]) -> None:
         self.stage = stage
         self.path = path
         self.prim: Any = None
-        self._start = start
         self._width = width
         self._colour = colour
         self._used_names: set[str] = set()
@@ -316,10 +315,10 @@ class SampledLines:
                 if name not in self._members:
                     path = f"{self.path}/{valid_name(name, self._used_names)}"
                     self._members[name] = _Line(self.stage, path, name, self._width, self._colour)
-                rows.append(self._members[name].begin(time, parts, start=self._start))
+                rows.append(self._members[name].begin(time, parts))
             for name, member in self._members.items():
                 if name not in lines:
-                    member.hide(time, start=self._start)
+                    member.show(time, False)
             self._rows = np.concatenate([*rows, np.empty(0, dtype=np.int32)])
             self._ends = np.cumsum([0, *map(len, rows)])
         if lines:
@@ -349,18 +348,17 @@ class _Line:
         self._points: Any = None
         self._extent: Any = None
 
-    def begin(self, time: Any, parts: Polylines, *, start: float) -> IntArray:
+    def begin(self, time: Any, parts: Polylines) -> IntArray:
         """Show the line from a time on, with this many points in each part; return the vertices that it runs through."""
-        from pxr import UsdGeom, Vt
+        from pxr import Vt
 
-        if not self._shown and not time.IsDefault() and time.GetValue() > start:
-            self._set_visibility(UsdGeom.Tokens.inherited, time, start)
+        self.show(time, True)
         length = sum(len(part) for part in parts)
         padding = 1 if length == self._stored else 0
         counts = np.array([len(part) for part in parts], dtype=np.int32)
         counts[-1] += padding
         self._curves.CreateCurveVertexCountsAttr().Set(Vt.IntArray.FromNumpy(counts), time)
-        self._stored, self._shown = length + padding, True
+        self._stored = length + padding
         return np.concatenate([*parts, parts[-1][-1:]] if padding else parts)
 
     def write(self, time: Any, points: NDArray[np.float32], box: NDArray[np.float32]) -> None:
@@ -372,23 +370,20 @@ class _Line:
         self._points.Set(Vt.Vec3fArray.FromNumpy(points), time)
         self._extent.Set(Vt.Vec3fArray.FromNumpy(box), time)
 
-    def hide(self, time: Any, *, start: float) -> None:
-        """Hide the line from a time on."""
+    def show(self, time: Any, shown: bool) -> None:
+        """Show or hide the line from a time on; one that is there from the first frame on needs no word of it."""
         from pxr import UsdGeom
 
-        if self._shown:
-            self._set_visibility(UsdGeom.Tokens.invisible, time, start)
-            self._shown = False
-
-    def _set_visibility(self, visibility: str, time: Any, start: float) -> None:
-        from pxr import UsdGeom
-
+        if shown == self._shown:
+            return
+        self._shown, words = shown, (UsdGeom.Tokens.invisible, UsdGeom.Tokens.inherited)
+        if shown and (time.IsDefault() or time.GetValue() <= FIRST_FRAME):
+            return
         attribute = self._curves.CreateVisibilityAttr()
         if attribute.GetNumTimeSamples() == 0:
             # Before its first sample an attribute has that sample's value.
-            before = {UsdGeom.Tokens.inherited: UsdGeom.Tokens.invisible}.get(visibility, UsdGeom.Tokens.inherited)
-            attribute.Set(before, start)
-        attribute.Set(visibility, time)
+            attribute.Set(words[not shown], FIRST_FRAME)
+        attribute.Set(words[shown], time)
 
 
 def _label(prim: Any, label: str | None) -> None:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, FloatArray, IntArray
-from warpflat.flat import Surface, area_vectors, mean_normals, triangulate
+from warpflat.core import BoolArray, FloatArray, IntArray, unit
+from warpflat.flat import Surface, area_vectors, mean_normals, mesh_edges, triangulate
 from warpflat.pattern.export.figure import GREY, INK, Pen, Pixels
 from warpflat.pattern.export.geometry import outline_edges
 from warpflat.pattern.export.raster import Samples, rasterise, shade
@@ -127,9 +127,8 @@ def surface_view(surface: Surface, facets: Facets, lines: Mapping[str, list[IntA
         level = np.cos(elevation)
         towards = np.array([level * np.sin(azimuth), np.sin(elevation), level * np.cos(azimuth)])
         upwards = np.array([0.0, 1.0, 0.0])
-    towards = towards / np.linalg.norm(towards)
-    right = np.cross(upwards, towards)
-    right /= np.linalg.norm(right)
+    towards = unit(towards)
+    right = unit(np.cross(upwards, towards))
     directions = np.array([right, np.cross(towards, right), towards])
     return _seen(surface.vertices, facets, directions, lines)
 
@@ -257,10 +256,7 @@ class DrawnView:
         self._pen.axes.add_artist(Pixels(self._shot.pixels(face_colours), left=left, bottom=bottom, zorder=1))
         faces = self.view.facets.faces
         if self._shot.covered >= 50.0 * max(len(faces), 1):
-            closed = np.where(faces[:, 3:] >= 0, faces, faces[:, [0, 1, 2, 0]])
-            sides = np.stack([closed, np.roll(closed, -1, axis=1)], axis=-1).reshape(-1, 2)
-            edges = np.unique(np.sort(sides[sides[:, 0] != sides[:, 1]], axis=1), axis=0)
-            self.draw_segments(edges.astype(np.int32), width=0.35, colour=(*INK, 0.38), zorder=2)
+            self.draw_segments(mesh_edges(faces), width=0.35, colour=(*INK, 0.38), zorder=2)
         self.draw_segments(self.view.facets.outline, width=outline, zorder=4)
 
     def draw_segments(self, edges: IntArray, **look: Any) -> None:

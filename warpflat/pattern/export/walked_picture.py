@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from matplotlib.markers import CARETDOWNBASE, CARETUPBASE
 
-from warpflat.core import FloatArray
+from warpflat.core import FloatArray, unit
 from warpflat.pattern.drafting.walked import WalkedSeam
 from warpflat.pattern.export.figure import drawn_page
 from warpflat.pattern.export.packing import pack_boxes
@@ -77,7 +77,7 @@ def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSea
 def _fitted(seam: WalkedSeam) -> list[FloatArray]:
     """Return the line of a seam and the notches of both sides, level and around the origin, as large as a cell lets them be [in]."""
     start, end = seam.line[[0, -1]]
-    x, y = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
+    x, y = unit(end - start)
     along = np.array([[x, -y], [y, x]])
     level = seam.line @ along
     low, high = level.min(axis=0), level.max(axis=0)

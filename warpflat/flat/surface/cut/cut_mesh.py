@@ -18,28 +18,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import BoolArray, IndexArray, IntArray
 from warpflat.core.errors import InputError
-from warpflat.flat.surface.connectivity import components_of, join_labels
-from warpflat.flat.surface.half_edges import HalfEdges, half_edges
+from warpflat.flat.surface.connectivity import components_of, fan_labels, join_labels, part_fans
+from warpflat.flat.surface.cut.crack import Crack
+from warpflat.flat.surface.half_edges import HalfEdges, half_edges, paired_half_edges
 from warpflat.flat.surface.mesh import Surface
 
-__all__ = ["Crack", "Cut", "CutKind", "cut_along", "cut_along_many", "faces_at"]
+__all__ = ["Cut", "CutKind", "cut_along", "faces_at"]
 
 CutKind = Literal["dart", "slit", "split", "hole", "opening", "network"]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Crack:
-    """The two edges of cloth that one stretch of a cut leaves, matched vertex by vertex.
-
-    Attributes:
-        path: #P, vertices of the uncut mesh, in the direction in which the path was given.
-        left: #P, the vertices of the cut mesh on the left of that direction, seen from outside.
-        right: #P, those on the right. At the tip of a dart left and right are the same vertex.
-    """
-
-    path: IntArray
-    left: IntArray
-    right: IntArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,56 +56,24 @@ class Cut:
     components_before: int
     of_faces: dict[str, Any] = field(default_factory=dict, repr=False)
 
-    @property
-    def seam(self) -> Crack:
-        """The one stretch of a plain cut.
 
-        Raises:
-            ValueError: if the cut has several stretches: then ask for them one by one.
-        """
-        if len(self.seams) != 1:
-            raise ValueError(f"the cut consists of {len(self.seams)} seams, not of one; use Cut.seams")
-        return self.seams[0]
+def cut_along(faces: IntArray, paths: Sequence[ArrayLike], *, vertex_count: int) -> Cut:
+    """Cut a mesh along paths of edges; they may meet, branch and cross in vertices, but share no edge.
 
-    @property
-    def path(self) -> IntArray:
-        """#P, the old vertices along a plain cut."""
-        return self.seam.path
-
-    @property
-    def left(self) -> IntArray:
-        """#P, the new vertices along the left side of a plain cut."""
-        return self.seam.left
-
-    @property
-    def right(self) -> IntArray:
-        """#P, the new vertices along the right side of a plain cut."""
-        return self.seam.right
-
-
-def cut_along(faces: IntArray, path: ArrayLike, *, vertex_count: int) -> Cut:
-    """Cut a mesh along one path of edges.
+    Paths that end on one another need be given in no special order: a path of one edge is fine as long as one of its ends lies on the
+    border or on another path.
 
     Args:
         faces: #F by 4, consistently wound, manifold; -1 in the last column of a triangle.
-        path: #P vertices, each joined to the next by an edge; a closed path repeats its first vertex.
+        paths: each #P vertices, each joined to the next by an edge; a closed path repeats its first vertex.
         vertex_count: #V.
 
     Returns:
         The cut. It conserves faces, their order and winding, and hence every area and length.
 
     Raises:
-        InputError: if the path leaves the mesh, visits a vertex twice, runs along the border, is shorter than one edge,
+        InputError: if a path leaves the mesh, visits a vertex twice, runs along the border, is shorter than one edge,
             or separates nothing (one edge with both ends inside). The message names the vertices.
-    """
-    return cut_along_many(faces, [path], vertex_count=vertex_count)
-
-
-def cut_along_many(faces: IntArray, paths: Sequence[ArrayLike], *, vertex_count: int) -> Cut:
-    """Cut a mesh along several paths at once; they may meet, branch and cross in vertices, but share no edge.
-
-    Arguments, result and errors are those of :func:`cut_along`. Paths that end on one another need be given in no
-    special order: a path of one edge is fine as long as one of its ends lies on the border or on another path.
     """
     chains = [_checked_path(path, vertex_count) for path in paths]
     if not chains:
@@ -139,69 +93,29 @@ def cut_along_many(faces: IntArray, paths: Sequence[ArrayLike], *, vertex_count:
             raise InputError(f"edge {_edge(chain, int(again[0]))} is cut by two paths; leave it out of one of them")
         marked[edge] = True
 
-    # Each fan of faces around a vertex on a path gets a vertex of its own.
-    by_edge = np.argsort(he.edge, kind="stable")
-    same = (he.edge[by_edge[1:]] == he.edge[by_edge[:-1]]) & ~marked[he.edge[by_edge[1:]]]
-    a, b = by_edge[:-1][same], by_edge[1:][same]
-    # Wound consistently, one face's half-edge starts where the other's ends.
-    rows, columns = np.concatenate([a, he.next[a]]), np.concatenate([he.next[b], b])
-    fan = join_labels(len(he.tail), rows, columns)
-
-    vertex = he.tail.copy()
-    keep: dict[int, int] = {}
-    for half in np.concatenate([left for left, _ in sides]).tolist():
-        for corner in (half, int(he.next[half])):
-            keep.setdefault(int(he.tail[corner]), int(fan[corner]))
-    at_path = np.flatnonzero(np.isin(he.tail, on_path))
-    copies: list[int] = []
-    given: dict[int, int] = {}
-    fans = dict.fromkeys(on_path.tolist(), 0)
-    for corner in at_path.tolist():
-        old, group = int(he.tail[corner]), int(fan[corner])
-        if group not in given:
-            fans[old] += 1
-            if keep.setdefault(old, group) == group:
-                given[group] = old
-            else:
-                given[group] = vertex_count + len(copies)
-                copies.append(old)
-        vertex[corner] = given[group]
-    origin = np.append(np.arange(vertex_count), copies).astype(np.int32)
+    # Each fan of faces around a vertex on a path gets a vertex of its own; the one to the left of the path keeps the old one.
+    a, b = paired_half_edges(he)
+    whole = ~marked[he.edge[a]]
+    torn = np.zeros(vertex_count, dtype=bool)
+    torn[on_path] = True
+    along = np.concatenate([left for left, _ in sides])
+    keeping = np.stack([along, he.next[along]], axis=1).ravel()
+    parted, origin = part_fans(he, fan_labels(he, a[whole], b[whole]), torn, keeping=keeping)
     new_faces = faces.copy()
-    new_faces[near[he.face], he.slot] = vertex
-    seams: list[Crack] = []
-    for chain, (left, right) in zip(chains, sides, strict=True):
-        # Rows: the edges of the path; columns: where each starts and ends in the new numbering.
-        left_ends = np.column_stack([vertex[left], vertex[he.next[left]]])
-        right_ends = np.column_stack([vertex[he.next[right]], vertex[right]])
-        whole = np.flatnonzero((left_ends == right_ends).all(axis=1))
-        if len(whole):
-            raise InputError(
-                f"cutting edge {_edge(chain, int(whole[0]))} separates nothing, since both its ends lie inside and "
-                "stay whole; start at the border, end on another cut, or take at least two edges"
-            )
-        # A seam is a stretch along which both sides run on without a break.
-        count = len(left_ends)
-        joined = (left_ends[:-1, 1] == left_ends[1:, 0]) & (right_ends[:-1, 1] == right_ends[1:, 0])
-        starts = [0, *(np.flatnonzero(~joined) + 1).tolist()]
-        runs = [list(range(a, b)) for a, b in zip(starts, [*starts[1:], count], strict=True)]
-        closes = chain[0] == chain[-1] and left_ends[-1, 1] == left_ends[0, 0] and right_ends[-1, 1] == right_ends[0, 0]
-        if closes and len(runs) > 1:
-            runs[0] = runs.pop() + runs[0]
-        for run in runs:
-            last = run[-1]
-            seams.append(
-                Crack(
-                    path=np.append(chain[run], chain[last + 1]),
-                    left=np.append(left_ends[run, 0], left_ends[last, 1]),
-                    right=np.append(right_ends[run, 0], right_ends[last, 1]),
-                )
-            )
+    new_faces[near] = parted
+    vertex, fans = parted[he.face, he.slot], np.bincount(origin)
+    seams = [
+        seam
+        for chain, (left, right) in zip(chains, sides, strict=True)
+        for seam in _seams(
+            chain,
+            # Rows: the edges of the path; columns: where each starts and ends in the new numbering.
+            np.column_stack([vertex[left], vertex[he.next[left]]]),
+            np.column_stack([vertex[he.next[right]], vertex[right]]),
+        )
+    ]
 
-    nowhere = np.empty((0, 3))
-    cut_mesh = Surface(
-        vertices=nowhere, faces=new_faces, name="", input_vertices=nowhere, input_index=np.empty(0, dtype=np.int32)
-    )
+    cut_mesh = Surface(vertices=np.empty((0, 3)), faces=new_faces, name="")
     labels = components_of(cut_mesh)
     after = int(labels.max(initial=-1)) + 1
     # Joined again across the cut, its components are those before it.
@@ -212,7 +126,7 @@ def cut_along_many(faces: IntArray, paths: Sequence[ArrayLike], *, vertex_count:
         vertex_origin=origin,
         kind=_kind(chains, new_faces, labels, np.unique(labels[near]), after > before, fans),
         seams=tuple(seams),
-        tips=np.array([v for v in on_path.tolist() if fans[v] == 1], dtype=np.int32),
+        tips=on_path[fans[on_path] == 1].astype(np.int32),
         face_component=labels,
         component_count=after,
         components_before=before,
@@ -296,13 +210,36 @@ def _sides(
     return left, right
 
 
+def _seams(chain: IntArray, left: IntArray, right: IntArray) -> list[Crack]:
+    """Return the stretches of a path (#P) along which both sides run on without a break, by the ends of its edges there (#P - 1 by 2)."""
+    whole = np.flatnonzero((left == right).all(axis=1))
+    if len(whole):
+        raise InputError(
+            f"cutting edge {_edge(chain, int(whole[0]))} separates nothing, since both its ends lie inside and "
+            "stay whole; start at the border, end on another cut, or take at least two edges"
+        )
+    joined = (left[:-1, 1] == left[1:, 0]) & (right[:-1, 1] == right[1:, 0])
+    runs = np.split(np.arange(len(left)), np.flatnonzero(~joined) + 1)
+    closes = chain[0] == chain[-1] and left[-1, 1] == left[0, 0] and right[-1, 1] == right[0, 0]
+    if closes and len(runs) > 1:
+        runs[0] = np.concatenate([runs.pop(), runs[0]])
+    return [
+        Crack(
+            path=np.append(chain[run], chain[run[-1] + 1]),
+            left=np.append(left[run, 0], left[run[-1], 1]),
+            right=np.append(right[run, 0], right[run[-1], 1]),
+        )
+        for run in runs
+    ]
+
+
 def _kind(
     chains: Sequence[IntArray],
     faces: IntArray,
     labels: IntArray,
     touched: IntArray,
     parted: bool,
-    fans: dict[int, int],
+    fans: NDArray[np.integer],
 ) -> CutKind:
     """Return the kind of a cut (see :class:`Cut`).
 
@@ -312,7 +249,7 @@ def _kind(
         labels: #F, the component of each face after the cut.
         touched: the components beside the cut.
         parted: true if the cut has made one component two.
-        fans: the number of fans at each vertex of the paths.
+        fans: #V, the number of fans at each vertex.
     """
     if len(chains) > 1:
         return "network"
@@ -327,8 +264,8 @@ def _kind(
         return "hole" if int((border_count == len(chain) - 1).sum()) == 1 else "split"
     if parted:
         return "split"
-    inner = np.array([fans[v] for v in chain[1:-1].tolist()], dtype=np.int64)
-    ends = (fans[int(chain[0])] > 1) + (fans[int(chain[-1])] > 1)
+    inner = fans[chain[1:-1]]
+    ends = int((fans[chain[[0, -1]]] > 1).sum())
     # Inside the mesh a vertex with d cut edges has d fans, on the border d + 1.
     if ends == 0 and not (inner > 2).any():
         return "slit"

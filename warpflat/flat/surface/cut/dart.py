@@ -6,17 +6,15 @@ straight legs of one length, since they are sewn to each other.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths, polyline_length
+from warpflat.core.polyline import arc_lengths
+from warpflat.core.vectors import unit
 from warpflat.flat.surface.cut.dart_legs import check_tip_back
 from warpflat.flat.surface.overlap import OVERLAP, overlap_width, overlapping
 
@@ -32,9 +30,8 @@ __all__ = [
     "shape_fish_eye",
 ]
 
-
-_BLEND = 0.05
-_BLEND_PER_SHIFT = 8.0
+# The outline beside a dart follows a leg's end over this length [m], or over so many times the end's shift.
+_BLEND, _BLEND_PER_SHIFT = 0.05, 8.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +42,6 @@ class DartMeasure:
         opening: distance of its two ends on the border [m].
         angle: between the straight legs at the tip [rad], positive where the crack gapes, negative where it overlaps.
         left_leg, right_leg: straight lengths from the tip to the border [m].
-        left_seam, right_seam: lengths along the crack's edges [m].
         intake: cloth that a dart of this angle takes up across legs of the mean length [m]; negative for an overlap.
     """
 
@@ -53,8 +49,6 @@ class DartMeasure:
     angle: float
     left_leg: float
     right_leg: float
-    left_seam: float
-    right_seam: float
     intake: float
 
 
@@ -68,7 +62,6 @@ class FishEyeMeasure:
         overlap: width of the widest place in which its two sides lie over each other [m]; 0 if it gapes all along.
         station: which of the matching points are the widest, counted along the cut.
         first_angle, last_angle: at the two tips, between the lines to the widest points [rad]; negative for an overlap.
-        left_seam, right_seam: lengths along the edges [m].
     """
 
     length: float
@@ -77,8 +70,6 @@ class FishEyeMeasure:
     station: int
     first_angle: float
     last_angle: float
-    left_seam: float
-    right_seam: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -92,10 +83,7 @@ class DrawnDart:
         angle: between the legs [rad].
         intake: distance of the leg ends [m].
         fold_point: on the fold line, where the outline runs across the dart: cut along left_end, fold_point, right_end
-            and the folded cloth ends at the seam.
-        left, right: the vertices of the crack from the border to its tip, that the legs replace.
-        moved: #M, outline vertices that were moved to make the legs equal, the two leg ends among them.
-        moved_to: #M by 2, where to [m].
+            and the cloth, folded to the left, ends at the seam.
     """
 
     tip: FloatArray
@@ -105,10 +93,6 @@ class DrawnDart:
     angle: float
     intake: float
     fold_point: FloatArray
-    left: IntArray
-    right: IntArray
-    moved: IntArray
-    moved_to: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -131,18 +115,18 @@ class DrawnFishEye:
     last_leg: float
 
 
-def dart_measure(positions: ArrayLike, left: ArrayLike, right: ArrayLike) -> DartMeasure:
+def dart_measure(positions: FloatArray, left: IntArray, right: IntArray) -> DartMeasure:
     """Measure the crack that a dart's cut has opened.
 
     Args:
         positions: #P by 2, the layout [m], not mirrored.
-        left, right: the vertices along both sides of the cut, matched, as a :class:`~warpflat.flat.surface.cut.cut_mesh.Seam` has
+        left, right: the vertices along both sides of the cut, matched, as a :class:`~warpflat.flat.surface.cut.crack.Crack` has
             them: from the border to the tip or from the tip to the border. At the tip both are one vertex.
 
     Raises:
         InputError: if the cut has no tip (it parts the cloth) or two (a fish-eye dart), or a leg has no length.
     """
-    x, a, b = mouth_first(positions, left, right)
+    x, (a, b) = positions, mouth_first(left, right)
     tip = x[a[-1]]
     to_left, to_right = x[a[0]] - tip, x[b[0]] - tip
     legs = float(np.linalg.norm(to_left)), float(np.linalg.norm(to_right))
@@ -154,102 +138,85 @@ def dart_measure(positions: ArrayLike, left: ArrayLike, right: ArrayLike) -> Dar
         angle=angle,
         left_leg=legs[0],
         right_leg=legs[1],
-        left_seam=polyline_length(x[a]),
-        right_seam=polyline_length(x[b]),
         intake=sum(legs) * float(np.sin(angle / 2)),
     )
 
 
 def shape_dart(
-    positions: ArrayLike,
-    left: ArrayLike,
-    right: ArrayLike,
-    outline: ArrayLike,
-    *,
-    tip_back: float = 0.0,
-    blend: float | None = None,
-    fold: Literal["left", "right"] = "left",
+    positions: FloatArray, left: IntArray, right: IntArray, outline: IntArray, *, tip_back: float = 0.0
 ) -> DrawnDart:
     """Draw the dart that a crack stands for.
 
     The tip moves from the crack's tip towards the border along the bisector; the intake on the outline stays. Both legs
     get the mean of their lengths: each end moves along its own leg, by half the difference, and takes the outline
-    beside it along, less and less over `blend`. So the ends lie on the outline and the outline is smooth when sewn.
+    beside it along, less and less: over 50 mm, or more where an end moves by over 6 mm, so that the outline nowhere turns by more than
+    about 11 degrees. So the ends lie on the outline and the outline is smooth when sewn.
 
     Args:
         positions: #P by 2, the layout [m], not mirrored.
         left, right: as for :func:`dart_measure`.
         outline: #O, the loop of border vertices that the crack belongs to, either way round, the first not repeated.
         tip_back: how far the tip is moved back from the crack's tip (the bust point) [m].
-        blend: length of outline beside each end over which it is adjusted [m]; by default 50 mm, more where an end
-            moves by over 6 mm, so that the outline nowhere turns by more than about 11 degrees.
-        fold: the side to which the dart is pressed, for its `fold_point`.
 
     Raises:
         InputError: as :func:`dart_measure`; if the crack overlaps instead of gaping; if `tip_back` is negative or
             leaves no dart; if the crack's ends are not on the outline.
     """
-    x, a, b = mouth_first(positions, left, right)
+    x, (a, b) = positions, mouth_first(left, right)
     measure = dart_measure(positions, left, right)
     if measure.angle <= 0:
         raise InputError(f"the cut at vertex {int(a[0])} {overlapping(measure.opening)}")
     check_tip_back(tip_back, min(measure.left_leg, measure.right_leg) * float(np.cos(measure.angle / 2)))
-    if blend is not None and not (np.isfinite(blend) and blend >= 0):
-        raise InputError(f"blend is a length in metres, 0 or more, got {blend!r}")
-    if fold not in ("left", "right"):
-        raise InputError(f"fold is 'left' or 'right', got {fold!r}")
     crack_tip = x[a[-1]]
-    tip = crack_tip + tip_back * _unit(_unit(x[a[0]] - crack_tip) + _unit(x[b[0]] - crack_tip))
+    bisector = unit(x[a[0]] - crack_tip) + unit(x[b[0]] - crack_tip)
+    if not bisector.any():
+        raise InputError("the two legs of the dart point in opposite directions; it has no bisector")
+    tip = crack_tip + tip_back * unit(bisector)
     legs = [float(np.linalg.norm(x[side[0]] - tip)) for side in (a, b)]
     leg = 0.5 * sum(legs)
-    ends = [tip + _unit(x[side[0]] - tip) * leg for side in (a, b)]
-    if blend is None:
-        # The cosine is steepest in its middle: pi/2 times shift over blend.
-        blend = max(_BLEND, _BLEND_PER_SHIFT * abs(legs[0] - leg))
-    moved: dict[int, FloatArray] = {}
-    beside = []
-    for side, end in zip((a, b), ends, strict=True):
-        # The outline from the crack's end on the border away from the crack, half way round at most.
-        loop = np.asarray(outline, dtype=np.int32)
-        at = np.flatnonzero(loop == side[0])
-        if len(at) == 0:
-            raise InputError(f"vertex {int(side[0])}, where the cut meets the border, is not on the given outline")
-        rolled = np.roll(loop, -int(at[0]))
-        if rolled[-1] != side[1] and rolled[1 % len(rolled)] != side[1]:
-            raise InputError(f"vertices {int(side[0])} and {int(side[1])} of the cut are no neighbours on the outline")
-        if rolled[1 % len(rolled)] == side[1]:
-            rolled = np.roll(rolled[::-1], 1)
-        run = rolled[: len(rolled) // 2]
-        # The first point moves to `end`, and the next ones less and less over `blend` [m].
-        line = x[run]
-        reach = arc_lengths(line)
-        fade = (
-            np.where(reach < blend, 0.5 + 0.5 * np.cos(np.pi * reach / blend), 0.0)
-            if blend > 0
-            else np.zeros(len(reach))
-        )
-        fade[0] = 1.0
-        points, touched = line + np.multiply.outer(fade, end - line[0]), fade > 0
-        points[0] = end
-        beside.append(points)
-        moved.update(zip(run[touched].tolist(), points[touched], strict=True))
-    folded = 0 if fold == "left" else 1
+    left_end, right_end = (tip + unit(x[side[0]] - tip) * leg for side in (a, b))
+    # The outline from the left end away from the crack, half way round at most.
+    at = np.flatnonzero(outline == a[0])
+    if len(at) == 0:
+        raise InputError(f"vertex {int(a[0])}, where the cut meets the border, is not on the given outline")
+    rolled = np.roll(outline, -int(at[0]))
+    if rolled[-1] != a[1] and rolled[1 % len(rolled)] != a[1]:
+        raise InputError(f"vertices {int(a[0])} and {int(a[1])} of the cut are no neighbours on the outline")
+    if rolled[1 % len(rolled)] == a[1]:
+        rolled = np.roll(rolled[::-1], 1)
+    beside = x[rolled[: len(rolled) // 2]]
+    # The cosine is steepest in its middle: pi/2 times shift over blend.
+    reach, blend = arc_lengths(beside), max(_BLEND, _BLEND_PER_SHIFT * abs(legs[0] - leg))
+    fade = np.where(reach < blend, 0.5 + 0.5 * np.cos(np.pi * reach / blend), 0.0)
+    beside = beside + np.multiply.outer(fade, left_end - beside[0])
+    beside[0] = left_end
+    # Pressed to the left, half of the dart lies on the cloth beside it, mirrored in that leg. The mirrored fold line ends where it meets
+    # the outline; if it does not meet it, the fold is as long as the legs.
+    fold, along, fold_length = unit(0.5 * (left_end + right_end) - tip), unit(left_end - tip), leg
+    mirrored = 2 * (fold @ along) * along - fold
+    for p, q in pairwise(beside):
+        side = q - p
+        cross = mirrored[0] * side[1] - mirrored[1] * side[0]
+        if abs(cross) <= 1e-12 * float(np.linalg.norm(side)):
+            continue
+        offset = p - tip
+        ray = (offset[0] * side[1] - offset[1] * side[0]) / cross
+        share = (offset[0] * mirrored[1] - offset[1] * mirrored[0]) / cross
+        if ray > 0 and -1e-9 <= share <= 1 + 1e-9:
+            fold_length = float(ray)
+            break
     return DrawnDart(
         tip=tip,
-        left_end=ends[0],
-        right_end=ends[1],
+        left_end=left_end,
+        right_end=right_end,
         leg_length=leg,
-        angle=_angle(ends[0] - tip, ends[1] - tip),
-        intake=float(np.linalg.norm(ends[0] - ends[1])),
-        fold_point=_fold_point(tip, ends, leg, beside[folded], ends[folded]),
-        left=a,
-        right=b,
-        moved=np.array(list(moved), dtype=np.int32),
-        moved_to=np.array(list(moved.values())).reshape(-1, 2),
+        angle=_angle(left_end - tip, right_end - tip),
+        intake=float(np.linalg.norm(left_end - right_end)),
+        fold_point=tip + fold_length * fold,
     )
 
 
-def fish_eye_measure(positions: ArrayLike, left: ArrayLike, right: ArrayLike) -> FishEyeMeasure:
+def fish_eye_measure(positions: FloatArray, left: IntArray, right: IntArray) -> FishEyeMeasure:
     """Measure the crack of a cut with both ends inside.
 
     Args:
@@ -259,7 +226,7 @@ def fish_eye_measure(positions: ArrayLike, left: ArrayLike, right: ArrayLike) ->
     Raises:
         InputError: if the cut does not end in two tips, or they lie on one another.
     """
-    x, a, b = _sides(positions, left, right)
+    x, a, b = positions, left, right
     if a[0] != b[0] or a[-1] != b[-1] or len(a) < 3:
         raise InputError(f"the cut from vertex {int(a[0])} to {int(a[-1])} is no fish-eye dart: it needs two tips")
     axis = x[a[-1]] - x[a[0]]
@@ -280,12 +247,10 @@ def fish_eye_measure(positions: ArrayLike, left: ArrayLike, right: ArrayLike) ->
         station=station,
         first_angle=_angle(wide[1] - x[a[0]], wide[0] - x[a[0]]),
         last_angle=_angle(wide[0] - x[a[-1]], wide[1] - x[a[-1]]),
-        left_seam=polyline_length(x[a]),
-        right_seam=polyline_length(x[b]),
     )
 
 
-def shape_fish_eye(positions: ArrayLike, left: ArrayLike, right: ArrayLike, *, tip_back: float = 0.0) -> DrawnFishEye:
+def shape_fish_eye(positions: FloatArray, left: IntArray, right: IntArray, *, tip_back: float = 0.0) -> DrawnFishEye:
     """Draw the diamond that a fish-eye crack stands for, symmetric about the line of its tips.
 
     Args:
@@ -295,10 +260,10 @@ def shape_fish_eye(positions: ArrayLike, left: ArrayLike, right: ArrayLike, *, t
     Raises:
         InputError: as :func:`fish_eye_measure`; if the crack overlaps; if `tip_back` is negative or leaves no dart.
     """
-    x, a, b = _sides(positions, left, right)
+    x, a, b = positions, left, right
     measure = fish_eye_measure(positions, left, right)
     first, last = x[a[0]], x[a[-1]]
-    axis = _unit(last - first)
+    axis = unit(last - first)
     middle = 0.5 * (x[a[measure.station]] + x[b[measure.station]])
     along = float((middle - first) @ axis)
     if measure.first_angle <= 0 or measure.last_angle <= 0 or measure.overlap > OVERLAP:
@@ -318,67 +283,21 @@ def shape_fish_eye(positions: ArrayLike, left: ArrayLike, right: ArrayLike, *, t
     )
 
 
-def mouth_first(positions: ArrayLike, left: ArrayLike, right: ArrayLike) -> tuple[FloatArray, IntArray, IntArray]:
-    """Return the layout and both sides of a crack, from the border to the tip; reversed sides change places.
+def mouth_first(left: IntArray, right: IntArray) -> tuple[IntArray, IntArray]:
+    """Return both sides of a crack, from the border to the tip; reversed sides change places.
 
     Args and errors are those of :func:`dart_measure`.
     """
-    x, a, b = _sides(positions, left, right)
-    starts, ends = a[0] == b[0], a[-1] == b[-1]
+    starts, ends = left[0] == right[0], left[-1] == right[-1]
     if starts and ends:
-        raise InputError(f"the cut from vertex {int(a[0])} to {int(a[-1])} has two tips: measure it as a fish-eye dart")
+        raise InputError(
+            f"the cut from vertex {int(left[0])} to {int(left[-1])} has two tips: measure it as a fish-eye dart"
+        )
     if not (starts or ends):
-        raise InputError(f"the cut from vertex {int(a[0])} to {int(a[-1])} has no tip: it parts the cloth")
-    return (x, b[::-1], a[::-1]) if starts else (x, a, b)
-
-
-def _sides(positions: ArrayLike, left: ArrayLike, right: ArrayLike) -> tuple[FloatArray, IntArray, IntArray]:
-    x = np.asarray(positions, dtype=float)
-    a, b = np.asarray(left, dtype=np.int32), np.asarray(right, dtype=np.int32)
-    if x.ndim != 2 or x.shape[1] != 2:
-        raise InputError(f"a layout is #P by 2 positions [m], got an array of shape {x.shape}")
-    if a.ndim != 1 or a.shape != b.shape or len(a) < 2:
-        raise InputError(f"a cut's sides are two rows of as many vertices, at least two; got {a.shape} and {b.shape}")
-    both = np.concatenate([a, b])
-    outside = both[(both < 0) | (both >= len(x))]
-    if len(outside):
-        raise InputError(f"a side of the cut names vertex {int(outside[0])}; the layout has 0 to {len(x) - 1}")
-    return x, a, b
-
-
-def _fold_point(
-    tip: FloatArray, ends: Sequence[FloatArray], leg: float, outline: FloatArray, end: FloatArray
-) -> FloatArray:
-    """Return the end of the fold line at which the folded cloth ends on the outline beside the dart.
-
-    When the dart is pressed to one side, half of it lies on the cloth beside it, mirrored in that leg. The mirrored fold line ends
-    where it meets the outline. If it does not meet it, the fold is as long as the legs.
-    """
-    fold = _unit(0.5 * (ends[0] + ends[1]) - tip)
-    along = _unit(end - tip)
-    mirrored = 2 * (fold @ along) * along - fold
-    reach = leg
-    for p, q in pairwise(outline):
-        side = q - p
-        cross = mirrored[0] * side[1] - mirrored[1] * side[0]
-        if abs(cross) <= 1e-12 * float(np.linalg.norm(side)):
-            continue
-        offset = p - tip
-        ray = (offset[0] * side[1] - offset[1] * side[0]) / cross
-        share = (offset[0] * mirrored[1] - offset[1] * mirrored[0]) / cross
-        if ray > 0 and -1e-9 <= share <= 1 + 1e-9:
-            reach = float(ray)
-            break
-    return tip + reach * fold
+        raise InputError(f"the cut from vertex {int(left[0])} to {int(left[-1])} has no tip: it parts the cloth")
+    return (right[::-1], left[::-1]) if starts else (left, right)
 
 
 def _angle(u: FloatArray, v: FloatArray) -> float:
     """Return the angle from u to v [rad], counter-clockwise positive."""
     return float(np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v))
-
-
-def _unit(v: FloatArray) -> FloatArray:
-    length = float(np.linalg.norm(v))
-    if length <= 0:
-        raise InputError("the two legs of the dart point in opposite directions; it has no bisector")
-    return v / length

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -14,6 +14,7 @@ from warpflat.core.errors import InputError
 from warpflat.flat.surface.cut.cut_mesh import Cut, faces_at
 from warpflat.flat.surface.half_edges import half_edges, sides_of
 from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.normals import flat_areas
 from warpflat.flat.surface.triangles import corner_triangles
 
 __all__ = ["CutPart", "apply_cut", "lines_after_cut", "split_pieces"]
@@ -113,31 +114,20 @@ def lines_after_cut(lines: Mapping[str, IntArray], faces: IntArray, cut: Cut) ->
     return renumbered
 
 
-def split_pieces(surface: Surface, cut: Cut, *, names: Sequence[str] | None = None) -> tuple[CutPart, ...]:
+def split_pieces(surface: Surface, cut: Cut) -> tuple[CutPart, ...]:
     """Return one surface per connected piece of the cut mesh, in the order of their first faces.
 
-    Where a piece has only one part of a line, the part gets the line's plain name back.
+    Where a piece has only one part of a line, the part gets the line's plain name back. One piece keeps the surface's name; of two the
+    names end in where they lie to each other (.upper/.lower, .left/.right as the wearer sees it, .front/.back for Y up and +Z to the front;
+    .inner/.outer for a hole); more are numbered.
 
     Args:
         surface: the uncut surface.
         cut: made from its faces.
-        names: one per piece. By default one piece keeps the surface's name; of two the names end in where they lie to
-            each other (.upper/.lower, .left/.right as the wearer sees it, .front/.back for Y up and +Z to the front;
-            .inner/.outer for a hole); more are numbered.
-
-    Raises:
-        InputError: if the number of names is not that of the pieces, or a name occurs twice.
     """
     whole = apply_cut(surface, cut)
-    count = cut.component_count
-    if names is None:
-        chosen = _names_by_place(whole, cut)
-    elif len(names) != count or len(set(names)) != count:
-        raise InputError(f"the cut leaves {count} pieces: give {count} different names, got {', '.join(names)!s}")
-    else:
-        chosen = list(names)
     pieces = []
-    for label, name in enumerate(chosen):
+    for label, name in enumerate(_names_by_place(whole, cut)):
         face_index = np.flatnonzero(cut.face_component == label).astype(np.int32)
         faces = whole.faces[face_index]
         used = np.unique(faces[faces >= 0]).astype(np.int32)
@@ -174,11 +164,10 @@ def _names_by_place(whole: Surface, cut: Cut) -> list[str]:
         inner = int(np.argmin(border))
         return [f"{whole.name}.{'inner' if label == inner else 'outer'}" for label in range(2)]
     triangles, face, weight = corner_triangles(cut.faces)
-    corners = whole.vertices[triangles]
-    area = 0.5 * weight * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    area, middle = weight * flat_areas(whole.vertices, triangles), whole.vertices[triangles].mean(axis=1)
     label = cut.face_component[face]
     total = np.maximum(np.bincount(label, weights=area, minlength=2), np.finfo(float).tiny)
-    moment = [np.bincount(label, weights=area * corners.mean(axis=1)[:, axis], minlength=2) for axis in range(3)]
+    moment = [np.bincount(label, weights=area * middle[:, axis], minlength=2) for axis in range(3)]
     apart = np.array([m[0] / total[0] - m[1] / total[1] for m in moment])
     axis = int(np.argmax(np.abs(apart)))
     # Facing +Z with Y up, the wearer's left hand is at +X.

@@ -62,40 +62,8 @@ def split_faces_along(surface: Surface, path: SurfacePath, *, snap: float = 0.1)
     if not 0.0 <= snap < 0.5:
         raise InputError(f"snap is a share of an edge's length, from 0 to below 0.5, got {snap:g}")
     triangles, face_of = path_triangles(surface)
-    # Places near a vertex or an edge are moved onto it, and the detours that this closes are taken out.
     share = max(snap, _ROUNDING)
-    edges = border_edges(surface.faces)
-    border = {tuple(sorted(edge)) for edge in edges.tolist()} | {(v,) for v in edges.ravel().tolist()}
-    places: list[Place] = []
-    points: list[int] = []
-    last = len(path.points) - 1
-    for index in range(len(path.points)):
-        exact = path.place(index)
-        free = _without_small(exact, share, set())
-        is_end = index in (0, last) and not path.closed
-        place = free if is_end else _without_small(exact, share, border)
-        if places and free == places[-1]:
-            # Beside a border vertex that the path has reached already, moving onto it parts nothing.
-            continue
-        while is_end and len(places) > 1 and _without_small(places[-1], share, set()) == place:
-            del places[-1], points[-1]
-        if place not in places:
-            places.append(place)
-            points.append(index)
-            continue
-        back = places.index(place)
-        if path.closed and back == 0 and index > len(path.points) / 2:
-            continue
-        # A path that comes back to a place must have stayed within an edge's length of it.
-        first = points[back]
-        detour = path.points[first : index + 1]
-        crossed = [surface.vertices[support[support >= 0]] for support in path.support[first : index + 1]]
-        longest = max(float(np.linalg.norm(corners - corners[0], axis=1).max()) for corners in crossed)
-        if np.linalg.norm(detour - detour[0], axis=1).max() > longest:
-            raise InputError(f"the path crosses itself at {describe_place(place)}; draw it so that it does not")
-        del places[back + 1 :], points[back + 1 :]
-    if len(places) < (3 if path.closed else 2):
-        raise InputError(f"the path at {describe_place(places[0])} is too short: it lies within one snapping distance")
+    places = _snapped(surface, path, share)
     refined = Refinement(surface.vertices, triangles, {v for place in places for v in place}, share)
     chain = np.array(refined.insert_path(places, closed=path.closed), dtype=np.int32)
     refined.improve()
@@ -150,6 +118,43 @@ def split_faces_along(surface: Surface, path: SurfacePath, *, snap: float = 0.1)
     return SplitSurface(
         surface=new, path=chain, vertex_support=support, vertex_weights=weights, face_origin=face_origin[order]
     )
+
+
+def _snapped(surface: Surface, path: SurfacePath, share: float) -> list[Place]:
+    """Return the places of a path, those near a vertex or an edge moved onto it; the detours that this closes are taken out."""
+    edges = border_edges(surface.faces)
+    border = {tuple(sorted(edge)) for edge in edges.tolist()} | {(v,) for v in edges.ravel().tolist()}
+    places: list[Place] = []
+    points: list[int] = []
+    last = len(path.points) - 1
+    for index in range(len(path.points)):
+        exact = path.place(index)
+        free = _without_small(exact, share, set())
+        is_end = index in (0, last) and not path.closed
+        place = free if is_end else _without_small(exact, share, border)
+        if places and free == places[-1]:
+            # Beside a border vertex that the path has reached already, moving onto it parts nothing.
+            continue
+        while is_end and len(places) > 1 and _without_small(places[-1], share, set()) == place:
+            del places[-1], points[-1]
+        if place not in places:
+            places.append(place)
+            points.append(index)
+            continue
+        back = places.index(place)
+        if path.closed and back == 0 and index > len(path.points) / 2:
+            continue
+        # A path that comes back to a place must have stayed within an edge's length of it.
+        first = points[back]
+        detour = path.points[first : index + 1]
+        crossed = [surface.vertices[support[support >= 0]] for support in path.support[first : index + 1]]
+        longest = max(float(np.linalg.norm(corners - corners[0], axis=1).max()) for corners in crossed)
+        if np.linalg.norm(detour - detour[0], axis=1).max() > longest:
+            raise InputError(f"the path crosses itself at {describe_place(place)}; draw it so that it does not")
+        del places[back + 1 :], points[back + 1 :]
+    if len(places) < (3 if path.closed else 2):
+        raise InputError(f"the path at {describe_place(places[0])} is too short: it lies within one snapping distance")
+    return places
 
 
 def _without_small(place: Place, snap: float, border: set[tuple[int, ...]]) -> Place:

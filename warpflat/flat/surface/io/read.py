@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
@@ -20,13 +19,13 @@ from warpflat.core.file_names import check_file_name, make_file_name, plain_labe
 from warpflat.core.input_files import listening_to_reads, note_read, reading
 from warpflat.core.text import quote_value
 from warpflat.core.usd_process import read_apart
+from warpflat.flat.surface.io.raw_mesh import ALL_PRIMS, RawMesh
 from warpflat.flat.surface.io.read_obj import read_obj
 from warpflat.flat.surface.io.read_off import read_off
 from warpflat.flat.surface.io.read_trimesh import GLTF, read_with_trimesh
-from warpflat.flat.surface.io.usd_stage import ALL_PRIMS, UsdMesh
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.paths.lines import line_from_curve, with_lines
-from warpflat.flat.surface.repair.polygons import distinct_corners, pad_corners, split_polygons
+from warpflat.flat.surface.repair.polygons import distinct_corners, split_polygons
 from warpflat.flat.surface.repair.stray_vertex import stray_vertex, stray_words
 from warpflat.flat.surface.repair.validate import check_positions, make_surface
 
@@ -34,7 +33,6 @@ __all__ = [
     "METRES_PER_UNIT",
     "POSSIBLE",
     "SUFFIXES",
-    "RawMesh",
     "check_size",
     "read_mesh_file",
     "read_scan",
@@ -55,41 +53,6 @@ POSSIBLE = (3e-3, 20.0)
 _USUAL = (0.02, 5.0)
 # A garment that is worn, one unit of ten at most; and what is not doubted, pieces such as a pocket among it.
 _WORN, _LIKELY = (0.25, 2.2), (0.08, 3.0)
-
-
-@dataclass(kw_only=True)
-class RawMesh:
-    """A mesh as any format gives it.
-
-    Attributes:
-        vertices: #V by 3, in the file's unit.
-        polygons: #F by the largest corner count, filled up with -1.
-        scale: metres per unit, None where the file does not say.
-        split_corners: whether the format has one vertex per corner of a face, or per texture coordinate.
-        name: of the mesh in the file.
-        curves: #P by 3 by name; `chains`: vertices by name.
-        notes: one sentence each.
-        objects: objects, nodes or prims as (first vertex, name), in their order, and #F, the one of each face; None where the format
-            knows none.
-        marked: rows of vertices without a name: creases of USD, edge elements of PLY.
-        texture: #F by k by 2, texture coordinates at the corners, nan where there are none; None if the file has none.
-        face_material, face_group: #F, a number for the material of each face, and for its group, object, node or subset, each with
-            their names; None where the format knows none.
-    """
-
-    vertices: FloatArray
-    polygons: NDArray[np.int64]
-    scale: float | None
-    split_corners: bool = False
-    name: str | None = None
-    curves: dict[str, FloatArray] = field(default_factory=dict)
-    chains: dict[str, NDArray[np.int64]] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
-    objects: tuple[list[tuple[int, str]], NDArray[np.int64]] | None = None
-    marked: list[NDArray[np.int64]] = field(default_factory=list)
-    texture: FloatArray | None = None
-    face_material: tuple[NDArray[np.int64], tuple[str, ...]] | None = None
-    face_group: tuple[NDArray[np.int64], tuple[str, ...]] | None = None
 
 
 def read_surface(
@@ -234,90 +197,21 @@ def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
     scale = METRES_PER_UNIT[units] if units else None
     if suffix in _USD:
         # The modules of `warpflat.flat.surface` would bring Warp with them, which takes a second to load.
-        usd = read_apart("warpflat.flat.surface.io.usd_stage:read_usd_stage", file, prim=prim, metres_per_unit=scale)
-        assert isinstance(usd, UsdMesh)
-        for layer in usd.layers:
+        function = "warpflat.flat.surface.io.usd_stage:read_usd_stage"
+        usd, layers = read_apart(function, file, prim=prim, metres_per_unit=scale)
+        assert isinstance(usd, RawMesh)
+        for layer in layers:
             note_read(layer)
-        polygons, texture = pad_corners(usd.corners, usd.sizes), None
-        if np.isfinite(usd.texture).any():
-            texture = np.full((*polygons.shape, 2), np.nan)
-            texture[polygons >= 0] = usd.texture
-        return RawMesh(
-            vertices=usd.vertices,
-            polygons=polygons,
-            texture=texture,
-            face_material=usd.face_material,
-            face_group=usd.face_group,
-            scale=1.0,
-            name=usd.name,
-            curves=usd.curves,
-            notes=usd.notes,
-            objects=_in_turn(usd.groups, polygons),
-            marked=usd.creases,
-        )
+        return usd
     if prim == ALL_PRIMS:
         prim = None
     if prim is not None and suffix not in GLTF:
         raise InputError(f"prim = {prim!r} only means something in a USD or GLB file; use component to choose a part")
     if suffix == ".obj":
-        obj = read_obj(file)
-        raw = RawMesh(
-            vertices=obj.vertices,
-            polygons=obj.polygons,
-            scale=scale,
-            split_corners=obj.split_corners,
-            objects=obj.objects,
-            notes=obj.notes,
-            texture=obj.texture,
-            face_material=obj.face_material,
-            face_group=obj.face_group,
-        )
-        if not obj.lines:
-            return raw
-        # The sides of all polygons in both directions, each as one number: tail * number of vertices + head.
-        size = (obj.polygons >= 0).sum(axis=1)
-        column = np.arange(obj.polygons.shape[1])
-        follow = np.where(column[None, :] + 1 < size[:, None], column[None, :] + 1, 0)
-        heads = np.take_along_axis(obj.polygons, follow, axis=1)
-        real = obj.polygons >= 0
-        a, b = obj.polygons[real], heads[real]
-        stride = len(obj.vertices)
-        edges = np.unique(np.concatenate([a * stride + b, b * stride + a]))
-        for name, chains in obj.lines.items():
-            for number, chain in enumerate(chains):
-                key = name if len(chains) == 1 else f"{name}_{number + 1}"
-                line = np.array(chain, dtype=np.int64)
-                if np.isin(line[:-1] * stride + line[1:], edges).all():
-                    raw.chains[key] = line
-                else:
-                    raw.curves[key] = obj.vertices[line]
-        return raw
-    if suffix == ".off":
-        vertices, polygons = read_off(file)
-        return RawMesh(vertices=vertices, polygons=polygons, scale=scale)
-    mesh = read_with_trimesh(file, node=prim)
-    if scale is None and suffix in GLTF:
-        scale = 1.0
-    return RawMesh(
-        vertices=mesh.vertices,
-        polygons=mesh.faces,
-        scale=scale,
-        split_corners=mesh.split_corners,
-        objects=_in_turn(mesh.groups, mesh.faces) if mesh.groups else None,
-        notes=mesh.notes,
-        marked=list(mesh.edges),
-        texture=mesh.corner_texture,
-        face_material=mesh.face_material,
-        face_group=mesh.face_group,
-    )
-
-
-def _in_turn(
-    objects: list[tuple[int, str]], polygons: NDArray[np.int64]
-) -> tuple[list[tuple[int, str]], NDArray[np.int64]]:
-    """Return objects, each of its first vertex and name, whose vertices follow each other, and #F, the one of each face."""
-    first = np.array([start for start, _ in objects], dtype=np.int64)
-    return objects, np.maximum(np.searchsorted(first, polygons[:, 0], side="right") - 1, 0)
+        raw = read_obj(file)
+    else:
+        raw = read_off(file) if suffix == ".off" else read_with_trimesh(file, node=prim)
+    return raw if scale is None else replace(raw, scale=scale)
 
 
 def _refuse_stray_vertex(raw: RawMesh, scale: float, file: Path) -> None:

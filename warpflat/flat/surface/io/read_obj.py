@@ -7,7 +7,6 @@ normals its corners carry, so corners that a file splits per `vt` are whole agai
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 
@@ -17,10 +16,10 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.flat.surface.connectivity import chain_lines, join_labels
-from warpflat.flat.surface.io.usd_stage import numbered
+from warpflat.flat.surface.io.raw_mesh import RawMesh, following_corners, numbered
 from warpflat.flat.surface.repair.polygons import pad_corners
 
-__all__ = ["ObjMesh", "read_obj"]
+__all__ = ["read_obj"]
 
 _CONTINUED, _JOINT = re.compile(r"^(?:[^\n]*\\ *\r?\n)+[^\n]*", re.MULTILINE), re.compile(r"\\ *\r?\n")
 _AFTER_SLASH = re.compile(r"/\S*")
@@ -32,34 +31,10 @@ _SAME_TEXTURE = re.compile(r"([-+]?\d+)/\1(?:/\S*)?$")
 _TEXTURE = re.compile(r"[^\s/]+(?:/([-+]?\d{1,18})?\S*)?")
 
 
-@dataclass(kw_only=True)
-class ObjMesh:
-    """The contents of an OBJ file.
-
-    Attributes:
-        vertices: #V by 3, in file units.
-        polygons: #F by the largest corner count, vertex indices from 0, filled up with -1.
-        lines: line elements by the name of their group or object, each a list of chains of vertex indices.
-        split_corners: the exporter wrote one `v` per texture coordinate.
-        objects: as (first vertex, name), in their order, and #F, the one of each face.
-        texture: #F by k by 2, the texture coordinates of corners, nan where they have none; None if no face has any.
-        face_material, face_group: #F, a number for the material and the group or object of each face, and their names.
-        notes: what was left out, one sentence each.
-    """
-
-    vertices: FloatArray
-    polygons: NDArray[np.int64]
-    lines: dict[str, list[list[int]]] = field(default_factory=dict)
-    split_corners: bool = False
-    objects: tuple[list[tuple[int, str]], NDArray[np.int64]]
-    texture: FloatArray | None = None
-    face_material: tuple[NDArray[np.int64], tuple[str, ...]]
-    face_group: tuple[NDArray[np.int64], tuple[str, ...]]
-    notes: list[str] = field(default_factory=list)
-
-
-def read_obj(path: Path) -> ObjMesh:
+def read_obj(path: Path) -> RawMesh:
     """Read an OBJ file.
+
+    Line elements along edges are chains of vertices, others are curves; both have the name of their group or object.
 
     Raises:
         InputError: without the file's name, but with the line's number: for what is not OBJ, or not numbers.
@@ -105,23 +80,58 @@ def read_obj(path: Path) -> ObjMesh:
             group = rest.strip()
             whole = group if key == "o" else whole
             starts.append((len(vertices), group))
-    if not vertices:
-        raise InputError("not an OBJ file: no line of it is a vertex ('v x y z')")
-
-    # A fourth weight or colours after the position are left out.
-    words = chain.from_iterable(row.split(None, 3)[:3] for row in vertices)
-    try:
-        if "_" in "".join(vertices):  # as Python writes 1_000
-            raise ValueError
-        positions = np.fromiter(map(float, words), dtype=np.float64, count=3 * len(vertices)).reshape(-1, 3)
-    except ValueError:
-        bad = next((k for k, row in enumerate(vertices) if not _POSITION.match(row)), 0)
-        raise InputError(
-            f"line {vertex_line[bad]}: 'v {vertices[bad].strip()[:40]}' is not a position: expected three numbers"
-        ) from None
-    total = len(positions)
+    positions = _positions(vertices, vertex_line)
     if not faces:
-        raise InputError(f"has no faces, only {total:,} points: export it as a mesh, with 'f' lines")
+        raise InputError(f"has no faces, only {len(positions):,} points: export it as a mesh, with 'f' lines")
+    polygons = _polygons(faces, face_line, vertex_line)
+    texture, notes = _texture_of_corners(textures, texture_line, faces, face_line, polygons >= 0)
+    mesh = RawMesh(
+        vertices=positions,
+        polygons=polygons,
+        # All corners' texture coordinates have the numbers of their vertices: the exporter wrote one `v` per `vt`.
+        split_corners=len(textures) == len(positions)
+        and all(map(_SAME_TEXTURE.match, chain.from_iterable(row.split() for row in faces))),
+        # One object may hold groups that are pieces.
+        objects=_objects(
+            polygons, of_object if len(set(of_object)) > 1 or len(set(of_group)) < 2 else of_group, starts
+        ),
+        texture=texture,
+        face_material=numbered(of_material),
+        face_group=numbered(of_group),
+        notes=notes,
+    )
+    if elements:
+        # The sides of all polygons in both directions, each as one number: tail * number of vertices + head.
+        a, b = (
+            each[polygons >= 0] for each in (polygons, np.take_along_axis(polygons, following_corners(polygons), 1))
+        )
+        sides = np.unique(np.concatenate([a * len(positions) + b, b * len(positions) + a]))
+        for name, row in _line_elements(elements, len(positions)).items():
+            if np.isin(row[:-1] * len(positions) + row[1:], sides).all():
+                mesh.chains[name] = row
+            else:
+                mesh.curves[name] = positions[row]
+    return mesh
+
+
+def _positions(rows: list[str], lines: list[int]) -> FloatArray:
+    """Return the positions (#V by 3) of rows of text, and in `lines` where each stands; what follows three numbers is left out."""
+    if not rows:
+        raise InputError("not an OBJ file: no line of it is a vertex ('v x y z')")
+    words = chain.from_iterable(row.split(None, 3)[:3] for row in rows)
+    try:
+        if "_" in "".join(rows):  # as Python writes 1_000
+            raise ValueError
+        return np.fromiter(map(float, words), dtype=np.float64, count=3 * len(rows)).reshape(-1, 3)
+    except ValueError:
+        bad = next((k for k, row in enumerate(rows) if not _POSITION.match(row)), 0)
+        raise InputError(
+            f"line {lines[bad]}: 'v {rows[bad].strip()[:40]}' is not a position: expected three numbers"
+        ) from None
+
+
+def _polygons(faces: list[str], face_line: list[int], vertex_line: list[int]) -> NDArray[np.int64]:
+    """Return the vertices of faces (#F by k, filled up with -1), given as text, with the lines on which faces and vertices stand."""
 
     def refusal(face: int, what: str) -> InputError:
         return InputError(f"line {face_line[face]}: 'f {faces[face].strip()[:40]}' {what}")
@@ -139,29 +149,13 @@ def read_obj(path: Path) -> ObjMesh:
         bad = next((k for k, row in enumerate(corners) if not all(map(_CORNER.match, row))), 0)
         raise refusal(bad, "is not a face: expected vertex numbers") from None
     # Negative numbers count back from the face.
-    seen = np.repeat(np.searchsorted(vertex_line, face_line), count)
+    total, seen = len(vertex_line), np.repeat(np.searchsorted(vertex_line, face_line), count)
     index = np.where(given < 0, seen + given, given - 1)
     wrong = np.flatnonzero((index < 0) | (index >= total))
     if len(wrong):
         face = int(np.searchsorted(np.cumsum(count), wrong[0], side="right"))
         raise refusal(face, f"refers to vertex {given[wrong[0]]}, but the file has {total:,} (1 to {total})")
-    polygons = pad_corners(index, count)
-    texture, notes = _texture_of_corners(textures, texture_line, faces, face_line, polygons >= 0)
-    return ObjMesh(
-        vertices=positions,
-        polygons=polygons,
-        lines=_line_elements(elements, total),
-        # All corners' texture coordinates have the numbers of their vertices: the exporter wrote one `v` per `vt`.
-        split_corners=len(textures) == total and all(map(_SAME_TEXTURE.match, chain.from_iterable(corners))),
-        # One object may hold groups that are pieces.
-        objects=_objects(
-            polygons, of_object if len(set(of_object)) > 1 or len(set(of_group)) < 2 else of_group, starts
-        ),
-        texture=texture,
-        face_material=numbered(of_material),
-        face_group=numbered(of_group),
-        notes=notes,
-    )
+    return pad_corners(index, count)
 
 
 def _objects(
@@ -229,8 +223,8 @@ def _texture_of_corners(
     return texture, notes
 
 
-def _line_elements(rows: list[tuple[str, str, int, int]], total: int) -> dict[str, list[list[int]]]:
-    """Return the chains of each group from rows of (group, text, line number, vertices above it)."""
+def _line_elements(rows: list[tuple[str, str, int, int]], total: int) -> dict[str, NDArray[np.int64]]:
+    """Return the line elements, joined end to end, by the names of their groups; rows are (group, text, line number, vertices above it)."""
     elements: dict[str, list[list[int]]] = {}
     for group, text, line, seen in rows:
         try:
@@ -243,4 +237,9 @@ def _line_elements(rows: list[tuple[str, str, int, int]], total: int) -> dict[st
                 f"line {line}: 'l {text.strip()[:40]}' needs two or more vertices, each one of the file's {total:,}"
             )
         elements.setdefault(group or "line", []).append(path)
-    return {name: chain_lines(chains) for name, chains in elements.items()}
+    found = {}
+    for name, paths in elements.items():
+        chains = chain_lines(paths)
+        for number, row in enumerate(chains, start=1):
+            found[name if len(chains) == 1 else f"{name}_{number}"] = np.array(row, dtype=np.int64)
+    return found

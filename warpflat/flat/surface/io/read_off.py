@@ -10,10 +10,9 @@ import re
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
+from warpflat.flat.surface.io.raw_mesh import RawMesh
 from warpflat.flat.surface.repair.polygons import pad_corners
 
 __all__ = ["read_off"]
@@ -21,11 +20,8 @@ __all__ = ["read_off"]
 _HEADER = re.compile(r"\s*(ST)?(C)?(N)?OFF\b[ \t]*")
 
 
-def read_off(path: Path) -> tuple[FloatArray, NDArray[np.int64]]:
+def read_off(path: Path) -> RawMesh:
     """Read an OFF file.
-
-    Returns:
-        #V by 3, positions in the file's unit; #F by the largest corner count, vertex indices filled up with -1.
 
     Raises:
         InputError: without the file's name: what is not OFF, not a number, or missing.
@@ -93,4 +89,4 @@ def read_off(path: Path) -> tuple[FloatArray, NDArray[np.int64]]:
         raise InputError(
             f"face {face} (counted from 0) refers to vertex {flat[wrong[0]]}, but there are {points:,} (0 to {points - 1})"
         )
-    return positions, pad_corners(flat, sizes)
+    return RawMesh(vertices=positions, polygons=pad_corners(flat, sizes))

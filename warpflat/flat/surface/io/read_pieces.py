@@ -14,13 +14,13 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name, make_piece_name
 from warpflat.core.text import area_words, format_count
-from warpflat.flat.surface.io.read import POSSIBLE, RawMesh, check_size, read_mesh_file, wrong_size
-from warpflat.flat.surface.io.usd_stage import ALL_PRIMS
+from warpflat.flat.surface.io.raw_mesh import ALL_PRIMS, RawMesh
+from warpflat.flat.surface.io.read import POSSIBLE, check_size, read_mesh_file, wrong_size
 from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.normals import flat_areas
 from warpflat.flat.surface.repair.layers import Layer, overlap_notes, surplus_layers
 from warpflat.flat.surface.repair.meet import MEET, meet_borders
 from warpflat.flat.surface.repair.polygons import split_polygons
-from warpflat.flat.surface.repair.sheets import face_vectors
 from warpflat.flat.surface.repair.validate import ClosedSurfaceError, make_surface, parts_of_faces
 
 __all__ = ["object_parts", "read_pieces"]
@@ -68,7 +68,7 @@ def read_pieces(
                 surface = make_surface(points, of, name=title, weld=soup, source=source)
             except ClosedSurfaceError:
                 faces, _ = split_polygons(points, of)
-                closed.append(float(np.linalg.norm(face_vectors(points, faces), axis=1).sum()))
+                closed.append(float(flat_areas(points, faces).sum()))
                 continue
             size = float(np.ptp(surface.vertices, axis=0).max())
             largest = max(largest, size)

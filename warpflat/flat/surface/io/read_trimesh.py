@@ -7,7 +7,6 @@ import json
 import logging
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,7 +17,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.input_files import noting_resolver
 from warpflat.flat.surface.io.gltf import gltf_notes, gltf_table, plain_gltf
-from warpflat.flat.surface.io.usd_stage import numbered
+from warpflat.flat.surface.io.raw_mesh import RawMesh, numbered, objects_in_turn
 
 __all__ = ["GLTF", "read_with_trimesh"]
 
@@ -27,33 +26,7 @@ __all__ = ["GLTF", "read_with_trimesh"]
 GLTF = (".glb", ".gltf", ".vrm")
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrimeshMesh:
-    """The meshes of a file as one.
-
-    Attributes:
-        vertices: #V by 3, positions in the file's unit.
-        faces: #F by 3 vertices.
-        split_corners: whether the format splits vertices per corner of a face or per texture coordinate.
-        groups: the nodes as (first vertex, name), in their order.
-        edges: #E by 2, elements of a PLY file.
-        corner_texture: #F by 3 by 2, texture coordinates of GLB and glTF, nan where there are none; None if no corner has any.
-        face_material, face_group: #F, a number for the material and the node of each face, and their names.
-        notes: what a glTF has beside its scene, one sentence each.
-    """
-
-    vertices: FloatArray
-    faces: NDArray[np.int64]
-    split_corners: bool
-    groups: list[tuple[int, str]]
-    edges: NDArray[np.int64]
-    corner_texture: FloatArray | None
-    face_material: tuple[NDArray[np.int64], tuple[str, ...]]
-    face_group: tuple[NDArray[np.int64], tuple[str, ...]]
-    notes: list[str]
-
-
-def read_with_trimesh(file: Path, *, node: str | None) -> TrimeshMesh:
+def read_with_trimesh(file: Path, *, node: str | None) -> RawMesh:
     """Read a file's meshes as one.
 
     Args:
@@ -87,16 +60,19 @@ def read_with_trimesh(file: Path, *, node: str | None) -> TrimeshMesh:
     texture = np.concatenate(textures)
     size = [len(one.faces) for one in meshes]
     number, material = numbered([materials.get(one.geometry, "") for one in meshes])
-    return TrimeshMesh(
-        edges=edges,
+    nodes = tuple(one.node for one in meshes)
+    polygons = np.concatenate([one.faces + at for one, at in zip(meshes, start, strict=False)])
+    return RawMesh(
         vertices=np.concatenate([one.vertices for one in meshes]),
-        faces=np.concatenate([one.faces + at for one, at in zip(meshes, start, strict=False)]),
+        polygons=polygons,
+        scale=1.0 if suffix in GLTF else None,
         split_corners=suffix in (".stl", *GLTF) or textured,
-        groups=[(at, one.node) for one, at in zip(meshes, start, strict=False)] if suffix in GLTF else [],
-        corner_texture=texture if np.isfinite(texture).any() else None,
-        face_material=(np.repeat(number, size), material),
-        face_group=(np.repeat(np.arange(len(meshes)), size), tuple(one.node for one in meshes)),
         notes=notes,
+        objects=objects_in_turn(nodes, start[:-1], polygons) if suffix in GLTF else None,
+        marked=list(edges),
+        texture=texture if np.isfinite(texture).any() else None,
+        face_material=(np.repeat(number, size), material),
+        face_group=(np.repeat(np.arange(len(meshes)), size), nodes),
     )
 
 

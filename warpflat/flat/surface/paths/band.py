@@ -11,6 +11,7 @@ from warpflat.core.arrays import IntArray
 from warpflat.flat.surface.connectivity import border_loops
 from warpflat.flat.surface.half_edges import half_edges_of
 from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.normals import flat_areas
 from warpflat.flat.surface.paths.edge_paths import EdgeGraph, path_length
 from warpflat.flat.surface.paths.geodesic import distance_from
 from warpflat.flat.surface.triangles import corner_triangles
@@ -47,8 +48,7 @@ def line_along_band(surface: Surface, line: IntArray) -> IntArray | None:
     length, graph = path_length(surface, [line]), EdgeGraph(surface)
     on_border = half_edges_of(surface).count == 1
     triangles, _, share = corner_triangles(surface.faces)
-    p = surface.vertices[triangles]
-    area = float(0.5 * share @ np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1))
+    area = float(share @ flat_areas(surface.vertices, triangles))
     around = float(graph.length[on_border].sum())
     # Nor, then, is it many widths long, the area being that way times the mean width.
     if 4 * length >= around or around**2 < 4 * _NARROW * area:

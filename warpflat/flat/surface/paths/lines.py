@@ -1,7 +1,6 @@
 """Feature lines: paths along mesh edges, found from vertices, end points, planes or curves.
 
 Every function returns vertex indices of the surface, int32, along mesh edges; a closed line repeats its first vertex.
-Stretches of the border are in :mod:`warpflat.flat.surface.paths.border`.
 """
 
 from __future__ import annotations

@@ -13,11 +13,12 @@ from itertools import pairwise
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length, project_on_segments
+from warpflat.core.sorting import counting_sort
 from warpflat.flat.surface.closest import nearest_on_triangles
 from warpflat.flat.surface.connectivity import join_labels
 from warpflat.flat.surface.mesh import Surface
@@ -287,15 +288,14 @@ class VertexStar:
     """The triangles around each vertex, for walking from one to the next."""
 
     def __init__(self, triangles: IntArray) -> None:
-        corner = triangles.ravel()
         self.triangles = triangles
-        self._order = np.argsort(corner, kind="stable") // 3
-        self._start = np.searchsorted(np.sort(corner), np.arange(int(corner.max(initial=-1)) + 2))
+        order, self._start = counting_sort(triangles.ravel(), int(triangles.max(initial=-1)) + 1)
+        self._order = order // 3
 
-    def around(self, vertex: int) -> NDArray[np.int64]:
+    def around(self, vertex: int) -> IntArray:
         """Return the triangles at a vertex, sorted; none for a vertex in no triangle."""
         if vertex + 1 >= len(self._start):
-            return np.empty(0, dtype=np.int64)
+            return np.empty(0, dtype=np.int32)
         return self._order[self._start[vertex] : self._start[vertex + 1]]
 
     def sharing(self, vertices: Sequence[int]) -> list[int]:

@@ -18,8 +18,9 @@ from warpflat.core.text import area_words, format_count
 from warpflat.flat.surface.closest import nearest_on_triangles
 from warpflat.flat.surface.connectivity import orient
 from warpflat.flat.surface.half_edges import half_edges
+from warpflat.flat.surface.normals import flat_areas
 from warpflat.flat.surface.repair.polygons import distinct_corners, split_polygons
-from warpflat.flat.surface.repair.sheets import face_vectors, inner_sheets, outer_sheet
+from warpflat.flat.surface.repair.sheets import inner_sheets, outer_sheet
 from warpflat.flat.surface.triangles import triangulate
 
 __all__ = [
@@ -63,8 +64,7 @@ class Layer:
     @property
     def area(self) -> float:
         """Area [m2]."""
-        a, b, c = self.corners.transpose(1, 0, 2)
-        return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+        return float(flat_areas(self.vertices, triangulate(self.faces)[0]).sum())
 
     @cached_property
     def _near(self) -> Any:
@@ -229,7 +229,7 @@ def surplus_faces(vertices: FloatArray, polygons: NDArray[np.int64], part: IntAr
         for large in order[:after]:
             second[rows[small]] |= covered_faces(layers[small], layers[large])
     if second.any():
-        area = float(np.linalg.norm(face_vectors(vertices, faces[second]), axis=1).sum())
+        area = float(flat_areas(vertices, faces[second]).sum())
         count = format_count(len(np.unique(of[second])), "face")
         notes.append(f"{count} of {area_words(area)} dropped: a second layer that lies on another part there")
     surplus = np.zeros(len(polygons), dtype=bool)
@@ -239,7 +239,7 @@ def surplus_faces(vertices: FloatArray, polygons: NDArray[np.int64], part: IntAr
 
 def area_of(layer: Layer, chosen: BoolArray) -> float:
     """Return the area [m2] of the chosen faces (#F)."""
-    return float(np.linalg.norm(face_vectors(layer.vertices, layer.faces[chosen]), axis=1).sum())
+    return float(flat_areas(layer.vertices, layer.faces[chosen]).sum())
 
 
 def _has_faces(whole: Layer, part: Layer) -> bool:

@@ -7,21 +7,21 @@ place. A vertex that has none on the other side gets one: it is set into the bor
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import arc_lengths
-from warpflat.flat.surface.border_seams import SAME_PLACE
 from warpflat.flat.surface.connectivity import border_loops, join_labels
 from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.repair.sheets import face_vectors
+from warpflat.flat.surface.normals import area_vectors
 
-__all__ = ["MEET", "meet_borders"]
+__all__ = ["MEET", "SAME_PLACE", "meet_borders"]
 
+#: Points nearer to each other than this [m] are at one place in space.
+SAME_PLACE = 1e-5
 #: Borders that run along each other within this distance [m] are meant to meet.
 MEET = 1e-3
 # Of one border only places that lie within this share of the tolerance can meet, and further apart along it than so many times that far:
@@ -40,93 +40,19 @@ def meet_borders(surfaces: Sequence[Surface], tolerance: float = MEET) -> tuple[
         surfaces: the pieces of a garment, without feature lines.
         tolerance: largest distance of borders that belong together [m]; 0 leaves all as they are.
     """
-    from scipy.spatial import cKDTree
-
-    if tolerance <= 0.0:
+    rings = [(number, ring) for number, surface in enumerate(surfaces) for ring in border_loops(surface.faces)]
+    if tolerance <= 0.0 or not rings:
         return list(surfaces), []
-    owner, vertex, loop, follow, arc, around = (
-        list[int](),
-        list[int](),
-        list[int](),
-        list[int](),
-        list[float](),
-        list[float](),
-    )
-    for number, surface in enumerate(surfaces):
-        for ring in border_loops(surface.faces):
-            first, count = len(vertex), len(ring)
-            lengths = arc_lengths(surface.vertices[np.append(ring, ring[0])])
-            loop += [loop[-1] + 1 if loop else 0] * count
-            owner += [number] * count
-            vertex += ring.tolist()
-            follow += [first + (k + 1) % count for k in range(count)]
-            arc += lengths[:-1].tolist()
-            around += [float(lengths[-1])] * count
-    if not vertex:
-        return list(surfaces), []
-    points = np.array([surfaces[s].vertices[v] for s, v in zip(owner, vertex, strict=True)])
-    of_loop, after = np.array(loop), np.array(follow)
-    start, way = points, points[after] - points
-    length = np.linalg.norm(way, axis=1)
-    at, whole = np.array(arc), np.array(around)
-    # Places along all edges, no further from each other than the tolerance, find the edges near a point.
-    count = np.minimum(np.maximum(np.ceil(length / tolerance), 1), 1000).astype(np.int64)
-    of = np.repeat(np.arange(len(points)), count)
-    share = (np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[of]
-    tree = cKDTree(start[of] + share[:, None] * way[of])
-    reach = tolerance + 0.5 * float((length / count).max())
-
-    def near(
-        places: FloatArray, own: NDArray[np.int64], along: FloatArray
-    ) -> list[dict[int, tuple[float, int, float]]]:
-        """Return for each place the nearest place of every border within the tolerance: distance, edge, share of it."""
-        found = []
-        for place, edge, here, tried in zip(places, own, along, tree.query_ball_point(places, reach), strict=True):
-            edges = np.unique(of[tried])
-            gap = np.abs(at[edges] + 0.5 * length[edges] - here)
-            gap = np.minimum(gap, whole[edges] - gap) - 0.5 * length[edges]
-            to = place - start[edges]
-            foot = np.clip(
-                (to * way[edges]).sum(axis=1) / np.maximum(length[edges] ** 2, np.finfo(float).tiny), 0.0, 1.0
-            )
-            away = np.linalg.norm(to - foot[:, None] * way[edges], axis=1)
-            own_border = of_loop[edges] == of_loop[edge]
-            away[own_border & ((away > _OWN * tolerance) | (gap <= _APART * away + SAME_PLACE))] = np.inf
-            best: dict[int, tuple[float, int, float]] = {}
-            for k in np.argsort(-away, kind="stable").tolist():
-                if away[k] <= tolerance:
-                    best[int(of_loop[edges[k]])] = (float(away[k]), int(edges[k]), float(foot[k]))
-            found.append(best)
-        return found
-
-    rows = np.arange(len(points))
-    at_vertex = near(points, rows, at)
-    at_middle = near(start + 0.5 * way, rows, at + 0.5 * length)
+    borders = _Borders(surfaces, rings, tolerance)
+    at_vertex, at_middle = borders.near(0.0), borders.near(0.5)
     # A vertex takes part where one of its edges runs along the other border.
-    runs: list[set[int]] = [set() for _ in vertex]
-    for edge, other in enumerate(follow):
+    runs: list[set[int]] = [set() for _ in at_vertex]
+    for edge, other in enumerate(borders.after.tolist()):
         along = at_vertex[edge].keys() & at_vertex[other].keys() & at_middle[edge].keys()
         runs[edge] |= along
         runs[other] |= along
-    pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
-    a, b = pairs.T
-    apart = np.abs(at[a] - at[b])
-    apart, away = np.minimum(apart, whole[a] - apart), np.linalg.norm(points[a] - points[b], axis=1)
-    own_border = (away <= _OWN * tolerance) & (apart > _APART * away + SAME_PLACE)
-    least = length.copy()
-    least[after] = np.minimum(least[after], length)
-    fits = ((of_loop[a] != of_loop[b]) | own_border) & (
-        away <= np.maximum(_PAIR * np.minimum(least[a], least[b]), SAME_PLACE)
-    )
-    a, b = a[fits], b[fits]
-    taken = set[tuple[int, int]]()
-    joined = list[tuple[int, int]]()
-    for k in np.argsort(np.linalg.norm(points[a] - points[b], axis=1), kind="stable").tolist():
-        one, other = int(a[k]), int(b[k])
-        ends = (one, loop[other]), (other, loop[one])
-        if loop[other] in runs[one] and loop[one] in runs[other] and taken.isdisjoint(ends):
-            taken.update(ends)
-            joined.append((one, other))
+    joined, taken = borders.pair(runs)
+    points = borders.points
     label = join_labels(len(points), *np.array(joined, dtype=np.int64).reshape(-1, 2).T)
     size = np.bincount(label)
     mean = np.stack([np.bincount(label, points[:, k]) for k in range(3)], axis=1) / size[:, None]
@@ -137,73 +63,158 @@ def meet_borders(surfaces: Sequence[Surface], tolerance: float = MEET) -> tuple[
     target = np.where((spread[label] <= SAME_PLACE)[:, None], points, target)
     # A place of its own in the edge that it faces, for each vertex without a partner there.
     inserts = defaultdict[int, dict[int, tuple[float, int]]](dict)
-    for one, borders in enumerate(runs):
-        for border in borders:
+    for one, others in enumerate(runs):
+        for border in others:
             _, edge, foot = at_vertex[one].get(border, (0.0, 0, 0.0))
             if border in at_vertex[one] and (one, border) not in taken and _OFF_ENDS < foot < 1.0 - _OFF_ENDS:
                 inserts[edge][int(label[one])] = (foot, one)
-    made, moved, added = list[Surface](), 0, 0
-    farthest = 0.0
+    made, moved, added, farthest = list[Surface](), 0, 0, 0.0
     for number, surface in enumerate(surfaces):
-        mine = [k for k, of_surface in enumerate(owner) if of_surface == number]
-        ids = np.array([vertex[k] for k in mine])
+        mine = np.flatnonzero(borders.owner == number)
         vertices = surface.vertices.copy()
-        vertices[ids] = target[mine]
-        turned = (face_vectors(surface.vertices, surface.faces) * face_vectors(vertices, surface.faces)).sum(
-            axis=1
-        ) <= 0.0
+        vertices[borders.vertex[mine]] = target[mine]
+        before, after = (area_vectors(points, surface.faces) for points in (surface.vertices, vertices))
+        turned = (before * after).sum(axis=1) <= 0.0
         if turned.any():  # a face too small for that
             kept = np.unique(surface.faces[turned])
             vertices[kept[kept >= 0]] = surface.vertices[kept[kept >= 0]]
         step = np.linalg.norm(vertices - surface.vertices, axis=1)
         moved += int((step > 0.0).sum())
         farthest = max(farthest, float(step.max()))
-        faces = [[corner for corner in face if corner >= 0] for face in surface.faces.tolist()]
-        face_at = {(face[k - 1], face[k]): row for row, face in enumerate(faces) for k in range(len(face))}
-        places = list[FloatArray]()
-        for edge in mine:
-            new, last = list[int](), 0.0
+        places = dict[tuple[int, int], list[FloatArray]]()
+        for edge in mine.tolist():
+            last, ends = 0.0, (int(borders.vertex[edge]), int(borders.vertex[borders.after[edge]]))
             for foot, one in sorted(inserts.get(edge, {}).values()):
                 if foot - last > _OFF_ENDS:
-                    new.append(len(vertices) + len(places))
-                    places.append(target[one])
+                    places.setdefault(ends, []).append(target[one])
                     last = foot
-            if not new:
-                continue
-            tail, head = vertex[edge], vertex[follow[edge]]
-            row = face_at[tail, head]
-            face = faces[row]
-            turn = face.index(tail)
-            rest = [*face[turn:], *face[:turn]][2:]
-            # A fan around the corner before the edge; a quad keeps its last part.
-            chain = [tail, *new, head]
-            parts = [[chain[k], chain[k + 1], rest[-1]] for k in range(len(chain) - 1)]
-            parts[-1] = [chain[-2], head, *rest]
-            for k, part in enumerate(parts):
-                where = row if k == 0 else len(faces)
-                faces[where : where + 1] = [part]
-                face_at.update({(part[j - 1], part[j]): where for j in range(len(part))})
-        added += len(places)
-        if not places and not step.any():
-            made.append(surface)
-            continue
-        table = np.full((len(faces), 4), -1, dtype=np.int32)
-        for row, face in enumerate(faces):
-            table[row, : len(face)] = face
-        extra = np.array(places).reshape(-1, 3)
-        index = len(surface.input_vertices) + np.arange(len(places))
-        made.append(
-            replace(
-                surface,
-                vertices=np.vstack([vertices, extra]),
-                faces=table,
-                input_vertices=np.vstack([surface.input_vertices, extra]),
-                input_index=np.concatenate([surface.input_index, index]).astype(np.int32),
-            )
-        )
+        added += sum(map(len, places.values()))
+        made.append(_with_places(surface, vertices, places) if places or step.any() else surface)
     if not moved and not added:
         return made, []
     return made, [
         f"borders within {1e3 * tolerance:g} mm of each other were made to meet: {moved:,} of their vertices moved by at most "
         f"{1e3 * farthest:.2g} mm, {added:,} added"
     ]
+
+
+class _Borders:
+    """The vertices of all borders (#B), loop after loop, and the edge from each to the next.
+
+    Attributes:
+        owner, vertex: the surface, and the vertex there.
+        loop: the number of its border. after: the next one along it.
+        points: #B by 3 [m].
+    """
+
+    def __init__(self, surfaces: Sequence[Surface], rings: Sequence[tuple[int, IntArray]], tolerance: float) -> None:
+        from scipy.spatial import cKDTree
+
+        self._tolerance = tolerance
+        counts = [len(ring) for _, ring in rings]
+        begin, count = np.repeat(np.cumsum(counts) - counts, counts), np.repeat(counts, counts)
+        self.owner = np.repeat([number for number, _ in rings], counts)
+        self.vertex = np.concatenate([ring for _, ring in rings])
+        self.loop = np.repeat(np.arange(len(rings)), counts)
+        self.after = begin + (np.arange(len(begin)) - begin + 1) % count
+        rows = [surfaces[number].vertices[ring] for number, ring in rings]
+        self.points = np.concatenate(rows)
+        self._way = self.points[self.after] - self.points
+        self._length = np.linalg.norm(self._way, axis=1)
+        # Where along its border each lies, and how long that is around [m].
+        arcs = [arc_lengths(row, closed=True) for row in rows]
+        self._at = np.concatenate([arc[:-1] for arc in arcs])
+        self._around = np.repeat([arc[-1] for arc in arcs], counts)
+        # Places along all edges, no further from each other than the tolerance, find the edges near a point.
+        steps = np.minimum(np.maximum(np.ceil(self._length / tolerance), 1), 1000).astype(np.int64)
+        self._of = np.repeat(np.arange(len(steps)), steps)
+        share = (np.arange(len(self._of)) - np.repeat(np.cumsum(steps) - steps, steps) + 0.5) / steps[self._of]
+        self._tree = cKDTree(self.points[self._of] + share[:, None] * self._way[self._of])
+        self._reach = tolerance + 0.5 * float((self._length / steps).max())
+
+    def near(self, share: float) -> list[dict[int, tuple[float, int, float]]]:
+        """Return for the place at a share of each edge the nearest one of every border that is near: its distance, edge and share."""
+        found, length, way = [], self._length, self._way
+        places, along = self.points + share * way, self._at + share * length
+        for edge, tried in enumerate(self._tree.query_ball_point(places, self._reach)):
+            edges = np.unique(self._of[tried])
+            gap = np.abs(self._at[edges] + 0.5 * length[edges] - along[edge])
+            gap = np.minimum(gap, self._around[edges] - gap) - 0.5 * length[edges]
+            to = places[edge] - self.points[edges]
+            foot = np.clip(
+                (to * way[edges]).sum(axis=1) / np.maximum(length[edges] ** 2, np.finfo(float).tiny), 0.0, 1.0
+            )
+            away = np.linalg.norm(to - foot[:, None] * way[edges], axis=1)
+            own = self.loop[edges] == self.loop[edge]
+            away[own & ((away > _OWN * self._tolerance) | (gap <= _APART * away + SAME_PLACE))] = np.inf
+            best: dict[int, tuple[float, int, float]] = {}
+            for k in np.argsort(-away, kind="stable").tolist():
+                if away[k] <= self._tolerance:
+                    best[int(self.loop[edges[k]])] = (float(away[k]), int(edges[k]), float(foot[k]))
+            found.append(best)
+        return found
+
+    def pair(self, runs: Sequence[set[int]]) -> tuple[list[tuple[int, int]], set[tuple[int, int]]]:
+        """Return pairs of vertices that belong together, the nearest first, and for each of both the border on which it has a partner.
+
+        Args:
+            runs: for each vertex the borders along which it runs.
+        """
+        from scipy.spatial import cKDTree
+
+        a, b = cKDTree(self.points).query_pairs(self._tolerance, output_type="ndarray").T
+        apart = np.abs(self._at[a] - self._at[b])
+        apart, away = (
+            np.minimum(apart, self._around[a] - apart),
+            np.linalg.norm(self.points[a] - self.points[b], axis=1),
+        )
+        own_border = (away <= _OWN * self._tolerance) & (apart > _APART * away + SAME_PLACE)
+        least = self._length.copy()
+        least[self.after] = np.minimum(least[self.after], self._length)
+        fits = ((self.loop[a] != self.loop[b]) | own_border) & (
+            away <= np.maximum(_PAIR * np.minimum(least[a], least[b]), SAME_PLACE)
+        )
+        a, b, away, loop = a[fits], b[fits], away[fits], self.loop.tolist()
+        taken, joined = set[tuple[int, int]](), list[tuple[int, int]]()
+        for k in np.argsort(away, kind="stable").tolist():
+            one, other = int(a[k]), int(b[k])
+            ends = (one, loop[other]), (other, loop[one])
+            if loop[other] in runs[one] and loop[one] in runs[other] and taken.isdisjoint(ends):
+                taken.update(ends)
+                joined.append((one, other))
+        return joined, taken
+
+
+def _with_places(
+    surface: Surface, vertices: FloatArray, places: Mapping[tuple[int, int], Sequence[FloatArray]]
+) -> Surface:
+    """Return a surface with moved vertices (#V by 3 [m]) and new ones at places set into border edges, in their direction."""
+    faces = [[corner for corner in face if corner >= 0] for face in surface.faces.tolist()]
+    face_at = {(face[k - 1], face[k]): row for row, face in enumerate(faces) for k in range(len(face))}
+    extra = np.array([place for row in places.values() for place in row]).reshape(-1, 3)
+    first = len(vertices)
+    for (tail, head), row in places.items():
+        chain = [tail, *range(first, first + len(row)), head]
+        first += len(row)
+        at = face_at[tail, head]
+        face = faces[at]
+        turn = face.index(tail)
+        rest = [*face[turn:], *face[:turn]][2:]
+        # A fan around the corner before the edge; a quad keeps its last part.
+        parts = [[chain[k], chain[k + 1], rest[-1]] for k in range(len(chain) - 1)]
+        parts[-1] = [chain[-2], head, *rest]
+        for k, part in enumerate(parts):
+            where = at if k == 0 else len(faces)
+            faces[where : where + 1] = [part]
+            face_at.update({(part[j - 1], part[j]): where for j in range(len(part))})
+    table = np.full((len(faces), 4), -1, dtype=np.int32)
+    for number, face in enumerate(faces):
+        table[number, : len(face)] = face
+    index = len(surface.input_vertices) + np.arange(len(extra))
+    return replace(
+        surface,
+        vertices=np.vstack([vertices, extra]),
+        faces=table,
+        input_vertices=np.vstack([surface.input_vertices, extra]),
+        input_index=np.concatenate([surface.input_index, index]).astype(np.int32),
+    )

@@ -23,15 +23,17 @@ __all__ = [
     "split_quads",
 ]
 
+# Indices of a list in a message.
+_MOST_LISTED = 8
 # Entries of the table of faces, faces times the largest count of corners: a gigabyte.
 _MOST_CORNERS = 2**27
 
 
-def list_some(indices: ArrayLike, most: int = 8) -> str:
+def list_some(indices: ArrayLike) -> str:
     """Return the beginning of a list of indices and the number of the others, such as `3, 4, 9 and 12 more`."""
     values = np.asarray(indices).ravel()
-    shown = ", ".join(str(int(i)) for i in values[:most])
-    return shown if len(values) <= most else f"{shown} and {len(values) - most:,} more"
+    shown = ", ".join(str(int(i)) for i in values[:_MOST_LISTED])
+    return shown if len(values) <= _MOST_LISTED else f"{shown} and {len(values) - _MOST_LISTED:,} more"
 
 
 def pad_polygons(polygons: ArrayLike | Sequence[Sequence[int]]) -> NDArray[np.int64]:

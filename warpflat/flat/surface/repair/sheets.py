@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
-from warpflat.flat.surface.connectivity import components, join_labels
+from warpflat.flat.surface.connectivity import components, fan_labels, join_labels, part_fans
 from warpflat.flat.surface.half_edges import HalfEdges, border_edges, paired_half_edges
+from warpflat.flat.surface.normals import area_vectors
 
-__all__ = ["THICKEST", "OuterSheet", "face_vectors", "inner_sheets", "outer_sheet", "part_sheets"]
+__all__ = ["THICKEST", "OuterSheet", "inner_sheets", "outer_sheet", "part_sheets"]
 
 #: Cloth is no thicker than this [m], nor than this share of its size, the square root of the area of one side.
 THICKEST, _THICK_SHARE = 0.015, 0.03
@@ -26,13 +27,6 @@ _FLAT = 1e-6
 _CURVED = 0.02
 # The nearest face that looks the other way: a difference in direction of 1 counts like this share of the size.
 _TURN = 0.05
-
-
-def face_vectors(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return #F by 3, the vector area of each face (#F by 4): along its normal, as long as its area [m2]."""
-    last = np.where(faces[:, 3] >= 0, faces[:, 3], faces[:, 0])
-    a, b, c, d = (vertices[corner] for corner in (*faces[:, :3].T, last))
-    return np.asarray(0.5 * np.cross(c - a, d - b))
 
 
 def part_sheets(vertices: FloatArray, he: HalfEdges) -> tuple[IntArray, IntArray]:
@@ -78,27 +72,9 @@ def part_sheets(vertices: FloatArray, he: HalfEdges) -> tuple[IntArray, IntArray
             joined.append((int(at[one[k]]), int(at[other[k]])))
     plain = np.stack(paired_half_edges(he), axis=1)
     a, b = np.concatenate([plain[he.count[he.edge[plain[:, 0]]] == 2], np.array(joined, dtype=np.int64)]).T
-    opposite = he.tail[a] == he.head[b]
-    fan = join_labels(
-        len(he.tail),
-        np.concatenate([a, he.next[a]]),
-        np.concatenate([np.where(opposite, he.next[b], b), np.where(opposite, b, he.next[b])]),
-    )
-    # Of the fans at a vertex of such an edge the first keeps it; elsewhere all do.
     torn = np.zeros(len(vertices), dtype=bool)
     torn[he.edges[crowded]] = True
-    first = np.unique(fan, return_index=True)[1]
-    vertex = he.tail[first].astype(np.int64)
-    order = np.lexsort((first, vertex))
-    again = np.zeros(len(first), dtype=bool)
-    again[order[1:]] = vertex[order[1:]] == vertex[order[:-1]]
-    extra = np.flatnonzero(again & torn[vertex])
-    new = vertex.copy()
-    new[extra] = len(vertices) + np.arange(len(extra))
-    out = he.faces.copy()
-    out[he.face, he.slot] = new[fan]
-    origin = np.concatenate([np.arange(len(vertices)), vertex[extra]])
-    return out.astype(np.int32), origin.astype(np.int32)
+    return part_fans(he, fan_labels(he, a, b), torn)
 
 
 def _middles(vertices: FloatArray, faces: IntArray) -> FloatArray:
@@ -182,7 +158,7 @@ def outer_sheet(vertices: FloatArray, he: HalfEdges) -> OuterSheet | None:
         he: half-edges of faces that are wound alike, two at each edge.
     """
     faces = he.faces
-    vector = face_vectors(vertices, faces)
+    vector = area_vectors(vertices, faces)
     area = np.linalg.norm(vector, axis=1)
     middle = _middles(vertices, faces)
     if float((vector * (middle - middle.mean(axis=0))).sum()) < 0.0:
@@ -248,7 +224,7 @@ def inner_sheets(layers: Sequence[tuple[FloatArray, IntArray]]) -> dict[int, tup
     from scipy.spatial import cKDTree
 
     low, high = (np.array([bound(points, axis=0) for points, _ in layers]) for bound in (np.min, np.max))
-    vectors = [face_vectors(points, faces) for points, faces in layers]
+    vectors = [area_vectors(points, faces) for points, faces in layers]
     middles = [_middles(points, faces) for points, faces in layers]
     areas = np.array([np.linalg.norm(vector, axis=1).sum() for vector in vectors])
     if not areas.sum() > 0.0:

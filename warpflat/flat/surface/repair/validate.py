@@ -19,9 +19,17 @@ from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import check_file_name, check_label
 from warpflat.core.text import area_words, format_count, quote_value
-from warpflat.flat.surface.connectivity import border_loops, components, corner_fans, euler_characteristic, orient
+from warpflat.flat.surface.connectivity import (
+    border_loops,
+    components,
+    corner_fans,
+    euler_characteristic,
+    orient,
+    part_fans,
+)
 from warpflat.flat.surface.half_edges import HalfEdges, half_edges
 from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.normals import flat_areas
 from warpflat.flat.surface.repair.polygons import (
     distinct_corners,
     find_crossed_quads,
@@ -30,7 +38,7 @@ from warpflat.flat.surface.repair.polygons import (
     split_polygons,
     split_quads,
 )
-from warpflat.flat.surface.repair.sheets import THICKEST, face_vectors, outer_sheet, part_sheets
+from warpflat.flat.surface.repair.sheets import THICKEST, outer_sheet, part_sheets
 from warpflat.flat.surface.repair.slivers import merge_degenerate_faces
 from warpflat.flat.surface.repair.weld import t_junction, welding
 
@@ -94,11 +102,20 @@ class _Mesh:
 
     def describe(self, which: BoolArray) -> str:
         """Return how many faces of which area are chosen (#F), in words."""
-        area = np.linalg.norm(face_vectors(self.vertices, self.faces[which]), axis=1).sum()
+        area = flat_areas(self.vertices, self.faces[which]).sum()
         return f"{format_count(int(which.sum()), 'face')} of {area_words(float(area))}"
 
     def keep(self, which: BoolArray) -> None:
+        """Drop all faces but these (#F)."""
         self.faces, self.origin = self.faces[which], self.origin[which]
+
+    def drop_unused_vertices(self) -> IntArray:
+        """Drop vertices without a face; return #V, the new number of each that there was, -1 for those dropped."""
+        kept, number = _used_vertices(self.faces), np.full(len(self.vertices) + 1, -1, dtype=np.int32)
+        number[kept] = np.arange(len(kept), dtype=np.int32)
+        if len(kept) < len(self.vertices):
+            self.faces, self.vertices, self.index = number[self.faces], self.vertices[kept], self.index[kept]
+        return number[:-1]
 
 
 def make_surface(
@@ -154,33 +171,16 @@ def make_surface(
             mesh.keep(sheet.faces)
             mesh.notes.append(sheet.describe())
         _separate_touching_fans(mesh)
-        kept = _used_vertices(mesh.faces)
-        if len(kept) < len(mesh.vertices):
-            new = np.full(len(mesh.vertices) + 1, -1, dtype=np.int32)
-            new[kept] = np.arange(len(kept), dtype=np.int32)
-            mesh.faces = new[mesh.faces]
-            mesh.vertices, mesh.index = mesh.vertices[kept], mesh.index[kept]
+        mesh.drop_unused_vertices()
         kept_lines, off = renumber_lines(
             mesh.index, mesh.half_edges.edges, {key: place[path] for key, path in paths.items()}
         )
         mesh.notes += off
         if not closed:
-            loops = border_loops(mesh.half_edges)
-            if not loops:
-                raise ClosedSurfaceError(
-                    "the surface is closed (it has no border): cut the mesh open along a line, its vertices doubled "
-                    "there, or give the part that becomes one piece of cloth; [[cuts]] cut what is flat already"
-                )
-            handles = (2 - len(loops) - euler_characteristic(mesh.half_edges)) // 2
-            if handles:
-                raise InputError(
-                    f"the surface has {format_count(handles, 'handle')} (a tunnel, as where a strap joins two openings): cut it "
-                    "through there, or give a part without"
-                )
+            _require_border(mesh.half_edges)
         mesh.faces, mesh.origin, cut = split_quads(mesh.vertices, mesh.half_edges, mesh.origin, sliver_tolerance)
         for what, which in cut.items():
             mesh.notes.append(f"{format_count(len(which), 'quad')} {what} cut into triangles: {list_some(which)}")
-        before = len(mesh.vertices)
         faces, of, kept_lines, merged, left = merge_degenerate_faces(
             mesh.vertices, mesh.half_edges, kept_lines, sliver_tolerance
         )
@@ -191,18 +191,14 @@ def make_surface(
                 "redraw them"
             )
         if len(merged):
-            names = list_some(np.unique(mesh.origin[merged]))
-            used = len(np.unique(faces[faces >= 0]))
+            names, before = list_some(np.unique(mesh.origin[merged])), len(mesh.vertices)
+            mesh.faces, mesh.origin = faces, mesh.origin[of]
+            number = mesh.drop_unused_vertices()
+            kept_lines = {key: number[line].tolist() for key, line in kept_lines.items()}
             mesh.notes.append(
                 f"{format_count(len(merged), 'degenerate face')} (narrower than {sliver_tolerance:g} of the edges around) merged into "
-                f"neighbours, {before - used} of their vertices fell away: {names}"
+                f"neighbours, {before - len(mesh.vertices)} of their vertices fell away: {names}"
             )
-            mesh.faces, mesh.origin = faces, mesh.origin[of]
-            keep = _used_vertices(faces)
-            new = np.full(before + 1, -1, dtype=np.int32)
-            new[keep] = np.arange(len(keep), dtype=np.int32)
-            kept_lines = {key: new[line].tolist() for key, line in kept_lines.items()}
-            mesh.faces, mesh.vertices, mesh.index = new[faces], mesh.vertices[keep], mesh.index[keep]
         return Surface(
             vertices=np.ascontiguousarray(mesh.vertices),
             faces=np.ascontiguousarray(mesh.faces, dtype=np.int32),
@@ -416,7 +412,7 @@ def _choose_component(mesh: _Mesh, component: int | Literal["largest"] | None) -
     label = mesh.part
     sizes = np.bincount(label)
     # By area: a fine button, or a body, may have more faces than the cloth.
-    area = np.bincount(label, np.linalg.norm(face_vectors(mesh.vertices, mesh.faces), axis=1))
+    area = np.bincount(label, flat_areas(mesh.vertices, mesh.faces))
     rank = np.argsort(-np.round(area, 9), kind="stable")
     valid = f'component = "largest" or a number from 0 to {len(sizes) - 1}, by area, largest first'
     if component is None:
@@ -493,13 +489,13 @@ def _part_sheets(mesh: _Mesh) -> None:
     met = np.isin(np.sort(origin[sides], axis=1).astype(np.int64) @ digits, he.edges[crowded].astype(np.int64) @ digits)
     length, own = np.linalg.norm(np.diff(mesh.vertices[sides], axis=1)[:, 0], axis=1), mesh.part[parted.face[alone]]
     border, joined = (np.bincount(own, each, minlength=int(mesh.part.max()) + 1) for each in (length, length * met))
-    area = np.bincount(mesh.part, np.linalg.norm(face_vectors(mesh.vertices, faces), axis=1))
+    area = np.bincount(mesh.part, flat_areas(mesh.vertices, faces))
     walls = (area <= 0.5 * THICKEST * border) & (joined >= _WALL * border) & (border > 0.0)
     left_out = ""
     if walls.any() and not walls.all():
         left_out = f", {format_count(int(walls.sum()), 'wall')} between sheets left out ({area_words(float(area[walls].sum()))})"
         mesh.keep(~walls[mesh.part])
-    areas = np.sort(np.bincount(mesh.part, np.linalg.norm(face_vectors(mesh.vertices, mesh.faces), axis=1)))[::-1]
+    areas = np.sort(np.bincount(mesh.part, flat_areas(mesh.vertices, mesh.faces)))[::-1]
     off = [area_words(area) for area in areas[1 : 1 + max(len(areas) - before, 0)]]
     mesh.notes.append(
         f"{format_count(len(crowded), 'edge')} at which more than two faces meet: the sheets were parted there"
@@ -515,27 +511,28 @@ def _separate_touching_fans(mesh: _Mesh) -> None:
     if len(np.unique(tails)) == len(tails) and euler_characteristic(he) == 2 - len(border_loops(he)):
         # With fans apart the characteristic would be greater, and no connected surface has a greater one.
         return
-    fan = corner_fans(he)
-    # Fans are numbered by their first corners.
-    first = np.flatnonzero(np.diff(np.maximum.accumulate(fan), prepend=-1))
-    vertex = he.tail[first]
-    order = np.lexsort((first, vertex))
-    again = np.zeros(len(first), dtype=bool)
-    again[order[1:]] = vertex[order[1:]] == vertex[order[:-1]]
-    if not again.any():
+    faces, origin = part_fans(he, corner_fans(he), np.ones(len(mesh.vertices), dtype=bool))
+    copies = origin[len(mesh.vertices) :]
+    if len(copies) == 0:
         return
-    extra = np.flatnonzero(again)
-    new = np.full(len(first), -1, dtype=np.int64)
-    new[extra] = len(mesh.vertices) + np.arange(len(extra))
-    mesh.vertices = np.vstack([mesh.vertices, mesh.vertices[vertex[extra]]])
-    mesh.index = np.concatenate([mesh.index, mesh.index[vertex[extra]]])
-    of_corner = new[fan]
-    moved = of_corner >= 0
-    faces = mesh.faces.copy()
-    faces[he.face[moved], he.slot[moved]] = of_corner[moved]
-    mesh.faces = faces
-    names = list_some(np.unique(vertex[extra]))
-    mesh.notes.append(f"parts that touched only in a point were separated at vertices {names}")
+    mesh.faces, mesh.vertices, mesh.index = faces, mesh.vertices[origin], mesh.index[origin]
+    mesh.notes.append(f"parts that touched only in a point were separated at vertices {list_some(np.unique(copies))}")
+
+
+def _require_border(he: HalfEdges) -> None:
+    """Refuse a surface without a border, or with a handle."""
+    loops = border_loops(he)
+    if not loops:
+        raise ClosedSurfaceError(
+            "the surface is closed (it has no border): cut the mesh open along a line, its vertices doubled "
+            "there, or give the part that becomes one piece of cloth; [[cuts]] cut what is flat already"
+        )
+    handles = (2 - len(loops) - euler_characteristic(he)) // 2
+    if handles:
+        raise InputError(
+            f"the surface has {format_count(handles, 'handle')} (a tunnel, as where a strap joins two openings): cut it "
+            "through there, or give a part without"
+        )
 
 
 def _used_vertices(faces: NDArray[np.integer]) -> NDArray[np.int64]:

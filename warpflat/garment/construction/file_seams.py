@@ -13,11 +13,8 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.text import format_count
-from warpflat.flat.surface.connectivity import join_labels
-from warpflat.flat.surface.io.read import RawMesh
-from warpflat.flat.surface.repair.weld import weld_map
+from warpflat.core import BoolArray, FloatArray, format_count
+from warpflat.flat import RawMesh, following_corners, join_labels, weld_map
 
 __all__ = ["FILE_SEAMS", "MOST_ISLANDS", "FileSeams", "file_seams", "like_cut_pieces"]
 
@@ -159,8 +156,7 @@ class _Sides:
         polygons = raw.polygons
         real = polygons >= 0
         size = real.sum(axis=1)
-        column = np.arange(polygons.shape[1])
-        self._follow = np.where(column[None, :] + 1 < size[:, None], column[None, :] + 1, 0)
+        self._follow = following_corners(polygons)
         self._real = real
         self._place = place = weld_map(raw.vertices).astype(np.int64)
         self._points = raw.vertices
@@ -272,10 +268,7 @@ class _Sides:
 
 def _texture_areas(texture: FloatArray, polygons: Ids) -> FloatArray:
     """Return #F, the area of each face in the texture, negative where it is mirrored; 0 without coordinates."""
-    real = (polygons >= 0)[..., None]
-    size = (polygons >= 0).sum(axis=1)
-    column = np.arange(polygons.shape[1])
-    follow = np.where(column[None, :] + 1 < size[:, None], column[None, :] + 1, 0)
+    real, follow = (polygons >= 0)[..., None], following_corners(polygons)
     # What is beyond all numbers has no area.
     with np.errstate(over="ignore", invalid="ignore"):
         points = np.where(real, texture - texture[:, :1], 0.0)

@@ -11,15 +11,17 @@ from itertools import pairwise
 
 import numpy as np
 
-from warpflat.core.arrays import IntArray
-from warpflat.core.polyline import arc_lengths, polyline_length
-from warpflat.flat.flattening.harmonic_layout import harmonic_layout
-from warpflat.flat.flattening.progress import laid_stage
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.solver.steps import Relaxation
-from warpflat.flat.surface.connectivity import border_loops
-from warpflat.flat.surface.triangles import triangulate
-from warpflat.flat.surface.untangle import signed_cell_areas
+from warpflat.core import IntArray, arc_lengths, polyline_length
+from warpflat.flat import (
+    Flattening,
+    Relaxation,
+    border_loops,
+    flat_areas,
+    harmonic_layout,
+    laid_stage,
+    signed_cell_areas,
+    triangulate,
+)
 
 __all__ = ["Band", "cut_straight", "find_band"]
 
@@ -107,8 +109,7 @@ def find_band(piece: Flattening) -> Band | None:
     across = np.linalg.norm(placed[1] - placed[0], axis=1)
     if np.ptp(across) > _EVEN * across.mean():
         return None
-    a, b, c = worn[triangles].transpose(1, 0, 2)
-    area = float(np.linalg.norm(0.5 * np.cross(b - a, c - a), axis=1).sum())
+    area = float(flat_areas(worn, triangles).sum())
     long = lengths[first], lengths[first + 2]
     return Band(sides=sides, lengths=long, width=2.0 * area / (long[0] + long[1]))
 

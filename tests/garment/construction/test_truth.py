@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from warpflat.core.errors import InputError
-from warpflat.flat.surface.io.read import RawMesh, read_mesh_file
-from warpflat.flat.surface.io.sewn_panels import SewnPanel, sewn_panels
+from warpflat.flat.surface.io.raw_mesh import RawMesh
+from warpflat.flat.surface.io.read import read_mesh_file
 from warpflat.flat.surface.repair.validate import make_surface
+from warpflat.garment.construction.sewn_panels import SewnPanel, sewn_panels
 
 sys.path.insert(0, str(Path(__file__).parents[3] / "benchmarks"))
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.polyline import arc_lengths, segment_lengths
+from warpflat.core import FloatArray, IntArray, arc_lengths, segment_lengths
 from warpflat.kernels.constraints import LENGTHS, LINEAR, STRAIGHT
 
 __all__ = [

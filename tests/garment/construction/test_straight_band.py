@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from obj_files import write_obj
 
 import warpflat
 from warpflat.core.polyline import polyline_length
-from warpflat.flat.flattening.straight_band import find_band
 from warpflat.flat.surface.mesh import Surface
 from warpflat.garment.construction.constraints import FixedLength
 from warpflat.garment.construction.sew_pieces import sew_pieces
+from warpflat.garment.construction.straight_band import find_band
 
 
 def _strip(
@@ -122,13 +123,7 @@ def test_a_band_both_of_whose_edges_are_sewn_stays_as_worn(yoke):
 
 
 def test_the_command_cuts_a_neck_band_straight(command, yoke):
-    lines, count = [], 0
-    for surface in (yoke, _strip("band", NECK, TOP)):
-        lines.append(f"o {surface.name}")
-        lines += [f"v {x:.9f} {y:.9f} {z:.9f}" for x, y, z in surface.vertices.tolist()]
-        lines += ["f " + " ".join(str(v + 1 + count) for v in face) for face in surface.faces.tolist()]
-        count += len(surface.vertices)
-    Path("neck.obj").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_obj(Path("neck.obj"), yoke, _strip("band", NECK, TOP), names=(yoke.name, "band"), digits=".9f")
     plain = [
         "flatten",
         "neck.obj",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warpflat.core.arrays import FloatArray
-from warpflat.flat.model.constraint_equations import Correction, join_equations, seam_equations
+from warpflat.garment.construction.constraint_equations import Correction, join_equations, seam_equations
 
 
 @pytest.mark.parametrize("seed", range(4))

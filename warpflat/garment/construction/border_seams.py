@@ -13,17 +13,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.polyline import arc_lengths, project_on_segments
-from warpflat.flat.surface.connectivity import border_loops
-from warpflat.flat.surface.mesh import Surface
+from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest, project_on_segments
+from warpflat.flat import Surface, border_loops
 
-__all__ = ["SAME_PLACE", "BorderSeam", "SurfaceSeam", "surface_seams"]
+__all__ = ["BorderSeam", "SurfaceSeam", "surface_seams"]
 
-
-#: Points nearer to each other than this [m] are at one place in space.
-SAME_PLACE = 1e-5
 #: Sides that keep this near [m] to each other in space are one curve.
 _SHARED = 1e-3
 #: Other sides differ in length by no more than these shares: any, and those with as many vertices.

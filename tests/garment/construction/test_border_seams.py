@@ -16,10 +16,10 @@ from warpflat.core.errors import InputError
 from warpflat.flat.flattening.flatten_piece import flatten
 from warpflat.flat.flattening.result import Flattening
 from warpflat.flat.solver.options import RelaxOptions
-from warpflat.flat.surface.border_seams import BorderSeam, surface_seams
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.paths.lines import with_lines
 from warpflat.flat.surface.shapes import make_shape
+from warpflat.garment.construction.border_seams import BorderSeam, surface_seams
 from warpflat.garment.construction.sew_pieces import sew_pieces
 from warpflat.garment.construction.to_pattern import pattern_of_surface
 from warpflat.pattern.drafting.draft import draft_garment

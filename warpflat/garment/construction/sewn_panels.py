@@ -8,17 +8,21 @@ from os import PathLike
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
-from warpflat.core.file_names import make_file_name, make_piece_name
-from warpflat.core.text import format_count
-from warpflat.flat.surface.injective import overlap_area
-from warpflat.flat.surface.io.file_seams import MOST_ISLANDS, file_seams
-from warpflat.flat.surface.io.read import METRES_PER_UNIT, POSSIBLE, RawMesh, check_size, read_mesh_file
-from warpflat.flat.surface.io.usd_stage import ALL_PRIMS
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.repair.validate import make_surface, parts_of_faces
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import FloatArray, InputError, IntArray, format_count, make_file_name, make_piece_name
+from warpflat.flat import (
+    ALL_PRIMS,
+    METRES_PER_UNIT,
+    POSSIBLE,
+    RawMesh,
+    Surface,
+    check_size,
+    make_surface,
+    overlap_area,
+    parts_of_faces,
+    read_mesh_file,
+    triangulate,
+)
+from warpflat.garment import MOST_ISLANDS, file_seams
 
 __all__ = ["SewnPanel", "mesh_area", "read_sewn_panels", "sewn_panels", "with_cuts"]
 

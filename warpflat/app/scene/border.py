@@ -7,14 +7,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError, nearest
-from warpflat.core.polyline import arc_lengths, polyline_length, segment_lengths
-from warpflat.flat.surface.connectivity import border_loops
-from warpflat.flat.surface.half_edges import half_edges_of
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.paths.edge_paths import as_vertex
-from warpflat.flat.surface.triangles import triangulate
+from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest, polyline_length, segment_lengths
+from warpflat.flat import Surface, area_vectors, as_vertex, border_loops, half_edges_of, triangulate
 
 __all__ = ["SIDES", "line_on_border", "viewing_frame"]
 
@@ -46,8 +40,7 @@ def viewing_frame(surface: Surface) -> FloatArray:
     body's front, at the bottom. A piece that goes all around is seen from +Z.
     """
     triangles, _ = triangulate(surface.faces)
-    p = surface.vertices[triangles]
-    normals = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    normals = area_vectors(surface.vertices, triangles)
     total = normals.sum(axis=0)
     size, area = float(np.linalg.norm(total)), float(np.linalg.norm(normals, axis=1).sum())
     towards = total / size if size > _FACING * area else np.array([0.0, 0.0, 1.0])
@@ -174,8 +167,7 @@ def _corners(surface: Surface, loop: IntArray, side: str) -> dict[str, int]:
         )
     # How much of the border's length has the surface beside it turned away from the viewer?
     triangles, face = triangulate(surface.faces)
-    p = surface.vertices[triangles]
-    vector = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    vector = area_vectors(surface.vertices, triangles)
     normal = np.stack([np.bincount(face, vector[:, k], minlength=len(surface.faces)) for k in range(3)], axis=1)
     away = normal @ towards < -_AWAY * np.linalg.norm(normal, axis=1)
     sides = half_edges_of(surface)

@@ -11,10 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.flat.surface.cells import CellArrays, face_creases, make_cells
-from warpflat.flat.surface.laplacian import laplacian_of
-from warpflat.flat.surface.mesh import Surface, read_only, store_results
+from warpflat.core import FloatArray
+from warpflat.flat import CellArrays, Surface, face_creases, laplacian_of, make_cells, read_only, store_results
 
 __all__ = ["graded_layout", "stretches_worn"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warpflat.flat.flattening.graded import graded_layout, stretches_worn
 from warpflat.flat.surface.repair.validate import make_surface
+from warpflat.garment.construction.graded import graded_layout, stretches_worn
 
 
 @pytest.mark.parametrize("angle", [0.0, 14.0, 45.0])

@@ -8,13 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
-from warpflat.core.vectors import reflected
-from warpflat.flat.surface.border_seams import SAME_PLACE
-from warpflat.flat.surface.connectivity import join_labels
-from warpflat.flat.surface.half_edges import half_edges
-from warpflat.flat.surface.mesh import Surface
+from warpflat.core import FloatArray, InputError, IntArray, reflected
+from warpflat.flat import SAME_PLACE, Surface, half_edges, join_labels
 
 __all__ = ["even_sides", "mirror_images", "mirror_partners", "mirror_plane"]
 

@@ -9,18 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.core.vectors import laid_upon
-from warpflat.flat.fabric.fabric import Fabric
-from warpflat.flat.flattening.datum import resolve_datum
-from warpflat.flat.flattening.develop import Development
-from warpflat.flat.flattening.flatten_piece import check_settings
-from warpflat.flat.flattening.progress import laid_stage
-from warpflat.flat.flattening.result import Flattening
-from warpflat.flat.model.network import SpringNetwork
-from warpflat.flat.solver.options import RelaxOptions
-from warpflat.flat.solver.steps import Relaxation
-from warpflat.flat.surface.mesh import Surface
+from warpflat.core import FloatArray, laid_upon
+from warpflat.flat import (
+    Development,
+    Fabric,
+    Flattening,
+    Relaxation,
+    RelaxOptions,
+    SpringNetwork,
+    Surface,
+    check_settings,
+    laid_stage,
+    resolve_datum,
+)
 
 __all__ = ["CutPattern", "distances_laid", "laid_as_cut"]
 

@@ -8,10 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.repair.meet import MEET, meet_borders
-from warpflat.flat.surface.shapes import check_range, grid_surface, make_named
+from warpflat.core import FloatArray
+from warpflat.flat import MEET, Surface, check_range, grid_surface, make_named, meet_borders
 
 __all__ = ["PIECES", "apron", "make_pieces", "sun_hat", "tote"]
 

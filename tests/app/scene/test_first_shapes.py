@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from warpflat.app.scene.first_shapes import PIECES, make_pieces
 from warpflat.core.errors import InputError
-from warpflat.flat.surface.first_shapes import PIECES, make_pieces
 
 
 def border_length(points: np.ndarray, closed: bool = False) -> float:

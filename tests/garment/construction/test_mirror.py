@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from warpflat.core.errors import InputError
-from warpflat.flat.surface.mirror import even_sides, mirror_partners
 from warpflat.flat.surface.shapes import make_shape
+from warpflat.garment.construction.mirror import even_sides, mirror_partners
 
 
 def test_a_grid_is_its_own_mirror_image_about_its_middle_column():

@@ -17,9 +17,9 @@ import warpflat
 from warpflat.app.cli.main import main
 from warpflat.app.scene.found_seams import found_seams
 from warpflat.app.scene.load import make_scene
-from warpflat.flat.surface.io.file_seams import file_seams, like_cut_pieces
 from warpflat.flat.surface.io.read import read_mesh_file
 from warpflat.flat.surface.repair.layers import Layer
+from warpflat.garment.construction.file_seams import file_seams, like_cut_pieces
 from warpflat.garment.seams.layers import read_garment
 
 ROWS, AROUND, PIECES = 9, 24, 4

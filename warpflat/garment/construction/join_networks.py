@@ -1,4 +1,4 @@
-"""Pieces side by side: their surfaces as one mesh, their networks as one network, for one set of launches."""
+"""Pieces side by side: their networks as one network, for one set of launches."""
 
 from __future__ import annotations
 
@@ -6,30 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.sums import range_offsets
-from warpflat.flat.model.network import SpringNetwork
-from warpflat.flat.model.springs import SpringArrays, SpringsAround
-from warpflat.flat.surface.cells import CellArrays
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.unfold import VertexLists
+from warpflat.core import FloatArray, IntArray, range_offsets
+from warpflat.flat import CellArrays, SpringArrays, SpringNetwork, SpringsAround, VertexLists, join_surfaces
 
-__all__ = ["join_networks", "join_surfaces"]
-
-
-def join_surfaces(surfaces: Sequence[Surface]) -> Surface:
-    """Return several surfaces as one, without their lines: vertices and faces of the first, then of the next."""
-    vertices = np.concatenate([surface.vertices for surface in surfaces])
-    first = range_offsets([len(surface.vertices) for surface in surfaces])
-    return Surface(
-        vertices=vertices,
-        faces=np.concatenate(
-            [np.where(s.faces >= 0, s.faces + at, -1) for s, at in zip(surfaces, first, strict=False)]
-        ),
-        name=" + ".join(surface.name for surface in surfaces),
-        input_vertices=vertices,
-        input_index=np.arange(len(vertices), dtype=np.int32),
-    )
+__all__ = ["join_networks"]
 
 
 def join_networks(networks: Sequence[SpringNetwork]) -> SpringNetwork:

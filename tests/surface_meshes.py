@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.flat.surface.connectivity import components, non_manifold_vertices, orient
-from warpflat.flat.surface.half_edges import border_edges, half_edges, mesh_edges, non_manifold_edges
+from warpflat.flat.surface.half_edges import border_edges, half_edges, mesh_edges
 from warpflat.flat.surface.mesh import Surface
 
 Place = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
@@ -37,6 +37,14 @@ def grid(columns: int, rows: int, place: Place = plane) -> tuple[NDArray[np.floa
     i = np.arange(columns * rows, dtype=np.int32).reshape(rows, columns)
     quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
     return place(u.ravel(), v.ravel()), quads
+
+
+def rings(columns: int, rows: int) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Vertices around +Y ring by ring from below, with a radius of 1 m and a height of 2 m, and quads."""
+    i = np.arange(columns * rows, dtype=np.int32).reshape(rows, columns)
+    quads = np.stack([i[:-1], np.roll(i[:-1], -1, 1), np.roll(i[1:], -1, 1), i[1:]], axis=-1).reshape(-1, 4)
+    angle = np.tile(2 * np.pi * np.arange(columns) / columns, rows)
+    return np.stack([np.sin(angle), np.repeat(np.linspace(0, 2, rows), columns), np.cos(angle)], axis=-1), quads
 
 
 def scattered(
@@ -69,7 +77,7 @@ def broken_invariants(surface: Surface) -> list[str]:
         "faces are #F by 4 of 32 bits": faces.dtype == np.int32 and faces.shape[1] == 4,
         "vertices are finite and of 64 bits": vertices.dtype == np.float64 and np.isfinite(vertices).all(),
         "faces use every vertex": np.array_equal(np.unique(faces[faces >= 0]), np.arange(len(vertices))),
-        "it is a manifold": len(non_manifold_edges(faces)) == len(non_manifold_vertices(faces)) == 0,
+        "it is a manifold": half_edges(faces).count.max() <= 2 and len(non_manifold_vertices(faces)) == 0,
         "it is one part": components(faces).max() == 0,
         "it has a border": len(border_edges(faces)) > 0,
         "faces are wound alike": orient(faces)[1] == 0,
