@@ -206,8 +206,8 @@ def split_edge(pattern: Pattern, place: Place, at: Mapping[str, float]) -> tuple
     name, edge = place
     sample = pattern.piece(name, pattern.sample)
     new = find_unused_name(edge, {each.name for each in sample.edges})
-    # Of two parts that are equally long, as in the centre, the first one.
-    names = (edge, new) if at[pattern.sample] > 0.5 * sample.edge(edge).length - OFF_END else (new, edge)
+    # Of two parts that are equally long, as in the centre, the last one.
+    names = (edge, new) if at[pattern.sample] > 0.5 * sample.edge(edge).length + OFF_END else (new, edge)
     made = changed(pattern, place, lambda piece, whole: parted(whole, at[piece.size], names))
     return made, (name, names[0], 1)
 
