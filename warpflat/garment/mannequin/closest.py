@@ -9,14 +9,14 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.core import FloatArray, launch_quietly, unit
-from warpflat.flat import area_vectors, nearest_on_triangles, vertex_normals
+from warpflat.flat import area_vectors, vertex_normals
 from warpflat.kernels.closest import find_closest
 
 __all__ = ["Mesh"]
 
 
 class Mesh:
-    """A triangle mesh that answers for the nearest places on it.
+    """A triangle mesh that answers, in single precision, for the nearest places on it.
 
     Args:
         vertices: #V by 3 [m].
@@ -42,14 +42,12 @@ class Mesh:
 
     def closest(self, points: FloatArray) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
         """Return the nearest triangle of each point (#P), weights of the nearest place on it (#P by 3), and that place (#P by 3 [m])."""
-        found = wp.empty(len(points), dtype=wp.int32, device="cpu")
+        face = wp.empty(len(points), dtype=wp.int32, device="cpu")
+        weight = wp.empty(len(points), dtype=wp.vec3, device="cpu")
         given = [self._tree.id, wp.array(points, dtype=wp.vec3, device="cpu")]
-        launch_quietly(find_closest, dim=len(points), inputs=given, outputs=[found], device="cpu")
-        face = found.numpy().astype(np.int64)
-        # Which triangle it is, single precision tells well enough; the place on it counts.
-        corners = self.vertices[self.triangles[face]]
-        weights = nearest_on_triangles(corners, points)
-        return face, weights, np.einsum("pk,pka->pa", weights, corners)
+        launch_quietly(find_closest, dim=len(points), inputs=given, outputs=[face, weight], device="cpu")
+        found, share = face.numpy().astype(np.int64), weight.numpy().astype(np.float64)
+        return found, share, np.einsum("pk,pka->pa", share, self.vertices[self.triangles[found]])
 
     def sample(self, count: int) -> tuple[FloatArray, FloatArray]:
         """Return places spread evenly over the mesh, the same each time, and the normals of their triangles (#P by 3 each)."""
