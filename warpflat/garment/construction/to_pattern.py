@@ -10,7 +10,7 @@ import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
-from itertools import groupby, pairwise
+from itertools import combinations, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,10 +27,12 @@ from warpflat.core import (
     unit,
 )
 from warpflat.flat import (
+    SAME_PLACE,
     are_curved,
     border_loops,
     fish_eye_measure,
     grain_axes,
+    join_labels,
     open_length,
     pull_back,
     pull_back_eye,
@@ -41,7 +43,7 @@ from warpflat.garment.construction.closed_cuts import CLOSED, are_closed, close_
 from warpflat.garment.construction.darts import pleat_depths
 from warpflat.garment.construction.ease import measure_ease
 from warpflat.garment.construction.edge_rules import EdgeRules
-from warpflat.garment.construction.edges import SHORT, Place, lengths_of, with_pieces
+from warpflat.garment.construction.edges import SHORT, lengths_of, with_pieces
 from warpflat.garment.construction.equal_pieces import draw_equal_pieces_once
 from warpflat.garment.construction.facings import STAND, Stand
 from warpflat.garment.construction.finishing import finish_edges, hem_rises
@@ -53,7 +55,6 @@ from warpflat.garment.construction.mark_openings import mark_openings
 from warpflat.garment.construction.mirror_pieces import draw_pairs_once
 from warpflat.garment.construction.openings import one_sided, place_opening
 from warpflat.garment.construction.pockets import add_pockets
-from warpflat.garment.construction.sew_pieces import meeting_borders
 from warpflat.garment.construction.strips import CLOTH_WIDTH
 from warpflat.garment.mannequin.seam_names import name_seams
 from warpflat.pattern import (
@@ -93,6 +94,8 @@ ON_DATUM = 1e-3
 _DECIMALS = 6
 #: Least distance [m] of the grain line from darts and holes, and the steps [m] in which it is moved aside.
 GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
+#: A side of a seam is a row of at most so many edges, parted by corners in the plane.
+_MOST_EDGES = 8
 #: A piece hangs this far [m] in front of its surface, if its border spans the plane by this share at least.
 BESIDE, ALIGNED = 0.05, 1e-3
 #: How a note on a seam of a mesh begins that its pattern lacks.
@@ -678,50 +681,57 @@ def _edges_along(line: str, results: Sequence[Flattening], pieces: Sequence[Piec
 def _mesh_seams(
     results: Sequence[Flattening], pieces: Sequence[Piece], rules: EdgeRules, named: Sequence[Seam]
 ) -> tuple[Seam, ...]:
-    """Return the seams: those that are named, and pairs of rows of edges along borders that meet in space.
+    """Return the seams: those that are named, and pairs of rows of edges that are one curve in space.
 
     A corner in the plane parts the edge of one side alone: its other side is then sewn to a row of edges.
     """
-    seams, done = [*named], {side.place for seam in named for side in seam.stretches}
-    # By its piece and its ends, as the border runs, the edge along which each mesh edge lies; and the order of the edges.
-    along, order = dict[tuple[str, int, int], Edge](), dict[Place, int]()
-    for piece in pieces:
-        for edge in piece.edges:
-            order[piece.name, edge.name] = len(order)
-            if edge.kind in ("seam", "cut") and edge.vertices is not None and (piece.name, edge.name) not in done:
-                along |= {(piece.name, a, b): edge for a, b in pairwise(edge.vertices.tolist())}
-    found = list[tuple[tuple[Place, ...], tuple[Place, ...], bool]]()
-    for pair in meeting_borders({result.surface.name: result.network.surface for result in results}):
-        (first, second), steps = pair.pieces, [list(pairwise(row.tolist())) for row in pair.vertices]
-        against = any((second, b, a) in along for a, b in steps[1])
-        one = [along.get((first, a, b)) for a, b in steps[0]]
-        other = [along.get((second, b, a) if against else (second, a, b)) for a, b in steps[1]]
-        corners = [k for k in range(len(one)) if one[k - 1] is not one[k] and other[k - 1] is not other[k]]
-        if all(row[0] == row[-1] for row in pair.vertices) and corners:
-            # A ring begins in a corner.
-            one, other = (row[corners[0] :] + row[: corners[0]] for row in (one, other))
-            corners = [k - corners[0] for k in corners]
-        for a, b in pairwise([0, *(k for k in corners if k > 0), len(one)]):
-            rows = [[next(same) for _, same in groupby(side[a:b], key=id)] for side in (one, other)]
-            if all(sum(len(e.points) - 1 if e else 0 for e in row) == b - a for row in rows) and all(map(all, rows)):
-                places = [
-                    tuple((name, edge.name) for edge in row if edge)[:: -1 if back else 1]
-                    for name, row, back in zip(pair.pieces, rows, (False, against), strict=True)
-                ]
-                if len({*places[0], *places[1]}) == len(places[0]) + len(places[1]):
-                    places.sort(key=lambda row: order[row[0]])
-                    found.append((places[0], places[1], against))
+    from scipy.spatial import cKDTree
+
+    seams: list[Seam] = [*named]
+    done = {side.place for seam in named for side in seam.stretches}
+    rows: list[tuple[tuple[SeamSide, ...], FloatArray]] = []
+    for result, piece in zip(results, pieces, strict=True):
+        vertices, count = result.network.surface.vertices, len(piece.edges)
+        for start in range(count):
+            ids: list[int] = []
+            for length in range(1, min(count, _MOST_EDGES) + 1):
+                edge = piece.edges[(start + length - 1) % count]
+                if edge.kind not in ("seam", "cut") or edge.vertices is None or (piece.name, edge.name) in done:
+                    break
+                if ids and (ids[-1] != edge.vertices[0] or ids[0] == ids[-1]):
+                    break
+                ids = [*ids[:-1], *edge.vertices.tolist()]
+                sides = [piece.edges[(start + k) % count].name for k in range(length)]
+                rows.append((tuple(SeamSide(piece=piece.name, edge=name) for name in sides), vertices[ids]))
+    if not rows:
+        return tuple(seams)
+    # Only rows whose ends lie at the same two places can be one curve.
+    ends = np.array([curve[[0, -1]] for _, curve in rows]).reshape(-1, 3)
+    place = join_labels(len(ends), *cKDTree(ends).query_pairs(SAME_PLACE, output_type="ndarray").T)
+    groups: dict[tuple[int, ...], list[tuple[tuple[SeamSide, ...], FloatArray]]] = {}
+    for row, here in zip(rows, np.sort(place.reshape(-1, 2), axis=1).tolist(), strict=True):
+        groups.setdefault(tuple(here), []).append(row)
+
+    def are_one(curve: FloatArray, other: FloatArray) -> bool:
+        return len(curve) == len(other) and bool(np.linalg.norm(curve - other, axis=1).max() < SAME_PLACE)
+
     # Those of fewest edges first, in the order of the pieces.
-    for ahead, behind, against in sorted(found, key=lambda each: (len(each[0]) + len(each[1]), order[each[0][0]])):
-        name = ahead[0][1].removesuffix(".left").removesuffix(".right")
+    order = {row: number for number, (row, _) in enumerate(rows)}
+    pairs = [pair for group in groups.values() for pair in combinations(group, 2)]
+    for (first, curve), (second, other) in sorted(
+        pairs, key=lambda pair: (len(pair[0][0]) + len(pair[1][0]), order[pair[0][0]])
+    ):
+        taken = [side.place for side in (*first, *second)]
+        if len(set(taken)) < len(taken) or not done.isdisjoint(taken):
+            continue
+        against = not are_one(curve, other)
+        if not are_one(curve, other[::-1] if against else other):
+            continue
+        done.update(taken)
+        name = first[0].edge.removesuffix(".left").removesuffix(".right")
         name = find_unused_name(name, {seam.name for seam in seams})
-        sides = (
-            tuple(SeamSide(piece=piece, edge=edge) for piece, edge in ahead),
-            tuple(
-                SeamSide(piece=piece, edge=edge, reversed=against) for piece, edge in behind[:: -1 if against else 1]
-            ),
-        )
-        seams.append(Seam(name=name, sides=sides, ease=rules.ease.get(name, 0.0)))
+        beside = tuple(replace(side, reversed=against) for side in (second[::-1] if against else second))
+        seams.append(Seam(name=name, sides=(first, beside), ease=rules.ease.get(name, 0.0)))
     return tuple(seams)
 
 
