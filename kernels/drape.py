@@ -40,7 +40,8 @@ class Contact:
     centre: the nearest place of the body [m]. normal: outwards; zero where no body is near. friction: Coulomb's coefficient.
     longest_step: bound of the way in one step of relaxation [m]. skin: stiffness of the body [N/m]. pressed: the normal force at
     no depth [N]. rubbed: the force of friction when the planes were last renewed [N]. anchor: where friction does not act [m].
-    grip: stiffness of friction before it slides [N/m]. most: the largest force of friction [N].
+    grip: stiffness of friction before it slides [N/m]. most: the largest force of friction [N]. depth: how far off its plane what
+    presses lay when the planes were last renewed [m].
     """
 
     centre: wp.array(dtype=wp.vec3d)
@@ -53,6 +54,7 @@ class Contact:
     anchor: wp.array(dtype=wp.vec3d)
     grip: wp.array(dtype=wp.float64)
     most: wp.array(dtype=wp.float64)
+    depth: wp.array(dtype=wp.float64)
 
 
 @wp.struct

@@ -9,6 +9,8 @@ wp.set_module_options({"enable_backward": False})
 
 # Distance from its plane at which a vertex rests on the body [m].
 TOUCH = wp.constant(wp.float64(1.0e-6))
+# A depth falls enough from round to round if it falls to this share.
+FALLS = wp.constant(wp.float64(0.25))
 
 
 @wp.kernel
@@ -73,22 +75,30 @@ def load_contact(
 
 
 @wp.kernel
-def carry_contact(motion: Motion, contact: Contact, first: int):
+def carry_contact(motion: Motion, contact: Contact, stiffer: wp.float64, first: int):
     """Take over the forces of body and friction at the present places, and put back on its plane what presses on it.
 
-    This is the update of the augmented Lagrangian: where the body pushed by its depth, it then pushes at no depth.
+    This is the update of the augmented Lagrangian: where the body pushed by its depth, it then pushes at no depth. Where tight cloth
+    is much stiffer than the skin, that takes many rounds, unless the skin becomes stiffer (Nocedal and Wright 2006, framework 17.4).
 
-    motion: of which position is moved. contact: pressed and rubbed are set.
+    motion: of which position is moved. contact: pressed, rubbed and depth are set, and skin where the depth has not fallen enough.
+    stiffer: by how much the skin becomes stiffer there.
     """
     i = natural(wp.tid() + first)
     zero = wp.float64(0.0)
     n = contact.normal[i]
+    before = contact.depth[i]
+    contact.depth[i] = zero
     if wp.dot(n, n) < wp.float64(0.5):
         contact.pressed[i] = zero
         return
     x = motion.position[i]
     gap = wp.dot(x - contact.centre[i], n)
     push = push_of_plane(gap, contact.skin[i], contact.pressed[i])
+    if push > zero:
+        contact.depth[i] = wp.abs(gap)
+        if wp.abs(gap) > wp.max(FALLS * before, TOUCH):
+            contact.skin[i] = contact.skin[i] * stiffer
     contact.rubbed[i] = friction_force(x, n, contact.anchor[i], contact.grip[i], contact.most[i])
     contact.pressed[i] = push
     if push > zero and motion.fixed[i] == wp.int8(0):

@@ -1,4 +1,5 @@
-"""Runs that are killed at times spread over them: the folder is as it was, or complete, and the next run leaves nothing of them.
+"""Runs that are killed at times spread over them, and while their files change places with those of the run before: the folder is as it
+was, or complete, and the next run leaves nothing of them.
 
 `WARPFLAT_KILLS=60 python -m pytest -s tests/fuzz/test_kills.py` kills so many instead of a few, and prints what it has found.
 """
@@ -30,6 +31,8 @@ COMMANDS = {
     "flatten": ("flatten", "mesh.obj", "--units", "m", "--name", "cap", "--out", "out", "-q"),
     "export": ("export", "out", "--format", "svg", "--format", "dxf", "--format", "pdf", "-q"),
 }
+# Files change places for about so long [s].
+ENDS = 0.15
 SIGNALS = ("SIGKILL", "SIGTERM", "SIGINT")
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="only POSIX has these signals")
@@ -65,6 +68,12 @@ def hidden(folder: Path) -> list[str]:
     return [path.name for path in folder.iterdir() if path.name.startswith(".")]
 
 
+def changes_places(process: subprocess.Popen[bytes], folder: Path) -> None:
+    """Wait until a run begins to put the files of the run before aside, or has ended."""
+    while process.poll() is None and not list(folder.glob(".run-warpflat-*/aside")):
+        time.sleep(0.001)
+
+
 def test_a_killed_run_leaves_no_half_result(tmp_path: Path):
     out = tmp_path / "out"
     (tmp_path / "cap.toml").write_text(SCENE)
@@ -84,8 +93,12 @@ def test_a_killed_run_leaves_no_half_result(tmp_path: Path):
         name = SIGNALS[(number + number // 3) % 3]
         before = digests(out)
         process = start(command, tmp_path)
-        # Shares of the usual time from early to late, all of them different.
-        time.sleep(seconds[command] * 1.05 * (0.5 + number) / KILLS)
+        # Shares of the usual time from early to late, all of them different; and each third kill at the end, which comes when it comes.
+        if (number + number // 9) % 3 == 2:
+            changes_places(process, out)
+            time.sleep(ENDS * number / KILLS)
+        else:
+            time.sleep(seconds[command] * 1.05 * (0.5 + number) / KILLS)
         ended = process.poll() is not None
         if not ended:
             process.send_signal(getattr(signal, name))

@@ -20,7 +20,7 @@ from command import Command, Ended
 
 from warpflat._version import __version__
 from warpflat.app.cli.progress_bar import ProgressBar
-from warpflat.app.cli.tables import warnings_of
+from warpflat.app.review.faults import faults_of
 from warpflat.app.scene import schema
 from warpflat.app.scene.options import SCENE_OPTIONS
 from warpflat.core.text import energy_words, format_count
@@ -124,7 +124,7 @@ def test_with_levels_it_says_how_much_work_the_limit_was_reached_with(command: C
 def test_a_residual_that_is_no_number_is_not_printed():
     last = {"steps": 9, "work_units": 9.0, "residual": math.inf, "strain_energy_j": 2e-3, "converged": False}
     for residual in (math.inf, None):
-        lines = warnings_of({"pieces": {"front": {"stages": [{**last, "residual": residual}], "flipped_faces": 0}}})
+        lines = faults_of({"pieces": {"front": {"stages": [{**last, "residual": residual}], "flipped_faces": 0}}})
         assert lines == [
             "front did not converge within 9 steps (strain energy 2 mJ); the pattern is not final: raise max_steps"
         ]

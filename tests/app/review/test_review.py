@@ -196,7 +196,7 @@ def test_the_verdict_says_whether_it_fits_what_it_needs_and_no_knit_is_an_error(
         "held": 0.0, "slack": 0.0, "outside": 0.0, "strain_limit": 0.15, "where_not": [], "where_slack": [],
         "would_help": [], "strain_warp": {"p95": 0.01}, "strain_weft": strain,
     }  # fmt: skip
-    piece = {"flipped_faces": 0, "converged": True, "area_m2": 0.5, "wear": fit}
+    piece = {"flipped_faces": 0, "stages": [{"converged": True}], "area_m2": 0.5, "wear": fit}
     ring = {
         "name": "neck",
         "passes": False,
@@ -228,11 +228,11 @@ def test_the_verdict_says_whether_it_fits_what_it_needs_and_no_knit_is_an_error(
     unfit = {
         **piece,
         "wear": {**fit, "held": 0.1, "where_not": ["stretched 9 %, 3 cm2"]},
-        "converged": False,
+        "stages": [{"name": "relax", "converged": False, "steps": 9, "work_units": 9.0, "residual": 0.1}],
     }
     words = told({"pieces": {"front": unfit, "back": piece}})
     assert (
-        words.index("not at rest: front")
+        words.index("front did not converge within 9 steps")
         < words.index("Does not fit by its strain")
         < words.index("front: stretched 9&nbsp;%, 3&nbsp;cm²")
     )

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from warpflat.app.cli.summary import notes_line, summary_lines
-from warpflat.app.cli.tables import run_summary, warnings_of
+from warpflat.app.cli.tables import run_summary
+from warpflat.app.review.faults import faults_of
 from warpflat.app.scene.load import make_scene
 from warpflat.app.scene.run import run_scene
 from warpflat.core.errors import InputError
@@ -106,7 +107,7 @@ def test_the_console_shows_ease_and_prices(skirt):
     assert row.endswith(" mJ")
     row = next(line for line in text.splitlines() if line.startswith("front.hip straight along weft"))
     assert row.endswith(" mJ")
-    assert warnings_of(result.metrics) == []
+    assert faults_of(result.metrics) == []
 
 
 def test_both_legs_of_a_dart_become_equally_long(tmp_path: Path):
@@ -150,7 +151,7 @@ def test_a_contradiction_is_a_warning_that_names_it(tmp_path: Path):
     result = run_scene(scene(BODICE, constraints=asked, relax={"max_steps": 3000}), tmp_path)
     assert not result.metrics["sewing"]["converged"]
     assert result.metrics["sewing"]["contradictory"]
-    told = warnings_of(result.metrics)
+    told = faults_of(result.metrics)
     assert any("trial.bust length 310 mm is amiss by" in line for line in told)
     assert any("its seams and constraints ask for more than it can give" in line for line in told)
     assert not any("raise max_steps" in line for line in told), "more steps end at the same one"
@@ -162,7 +163,7 @@ def test_a_limit_that_is_too_low_is_told_apart_from_a_contradiction(tmp_path: Pa
     )
     assert not result.metrics["sewing"]["converged"]
     assert not result.metrics["sewing"]["contradictory"]
-    assert any("raise max_steps" in line for line in warnings_of(result.metrics))
+    assert any("raise max_steps" in line for line in faults_of(result.metrics))
 
 
 @pytest.mark.parametrize(

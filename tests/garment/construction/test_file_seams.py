@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import obj_files
 import pytest
 import trimesh
 from scipy.sparse import coo_array
@@ -231,10 +232,10 @@ def test_a_half_that_lies_mirrored_on_the_other_is_an_island_of_its_own(tmp_path
     grid = np.arange(35).reshape(5, 7)
     x, y = np.meshgrid(np.linspace(-0.3, 0.3, 7), np.linspace(0.0, 0.4, 5))
     quads = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
-    rows = [f"v {a:g} {b:g} {0.1 * a * a:g}\nvt {abs(a):g} {b:g}" for a, b in zip(x.ravel(), y.ravel(), strict=True)]
-    rows += ["f " + " ".join(f"{k + 1}/{k + 1}" for k in quad) for quad in quads]
-    (tmp_path / "back.obj").write_text("\n".join(rows))
-    _, raw, _, _ = read_mesh_file(tmp_path / "back.obj", units="m", prim=None, name=None)
+    x, y = x.ravel(), y.ravel()
+    back = np.stack([x, y, 0.1 * x * x], axis=1), quads
+    path = obj_files.write_obj(tmp_path / "back.obj", back, texture=[np.stack([abs(x), y], axis=1)], digits="g")
+    _, raw, _, _ = read_mesh_file(path, units="m", prim=None, name=None)
     seams = file_seams(raw)["uv"]
     assert len(seams.names) == 2
     assert np.allclose(raw.vertices[seams.edges][..., 0], 0.0)

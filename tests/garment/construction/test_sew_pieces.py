@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from obj_files import write_obj
 
 from warpflat.app.cli.summary import notes_line
 from warpflat.app.scene.load import make_scene
@@ -48,15 +49,8 @@ def _barrel() -> dict[str, trimesh.Trimesh]:
 
 
 def _write_obj(path: Path, parts: dict[str, trimesh.Trimesh], *, named: bool = True, textured: bool = False) -> None:
-    lines, first = list[str](), 1
-    for name, mesh in parts.items():
-        lines += [f"o {name}"] if named else []
-        lines += [f"v {x} {y} {z}" for x, y, z in mesh.vertices.tolist()]
-        lines += [f"vt {k / 1000} 0" for k in range(len(mesh.vertices))] if textured else []
-        corner = "{0}/{0}" if textured else "{0}"
-        lines += ["f " + " ".join(corner.format(first + k) for k in face) for face in mesh.faces.tolist()]
-        first += len(mesh.vertices)
-    path.write_text("\n".join(lines) + "\n")
+    texture = [[(k / 1000, 0) for k in range(len(mesh.vertices))] for mesh in parts.values()] if textured else []
+    write_obj(path, *parts.values(), names=list(parts) if named else (), texture=texture, digits="")
 
 
 @pytest.mark.parametrize("kind", ["named.obj", "plain.obj", "textured.obj", "scene.glb", "stage.usda"])

@@ -15,7 +15,7 @@ from PIL import Image
 from pxr import Sdf, Usd, UsdGeom
 
 import warpflat
-from warpflat.app.cli.tables import warnings_of
+from warpflat.app.review.faults import faults_of
 from warpflat.app.scene.drape import drape_scene
 from warpflat.app.scene.load import load_scene
 from warpflat.core.arrays import FloatArray
@@ -256,7 +256,7 @@ def test_a_scene_with_a_drape_reports_it(tmp_path: Path):
     entry = json.loads((tmp_path / "out" / "metrics.json").read_text())["drape"]
     assert entry["steps"] <= 300
     fallen = {**result.metrics, "drape": {**entry, "converged": False, "distance_m": {"mean": 2.0}}}
-    assert any("slipped off its body" in line for line in warnings_of(fallen))
+    assert any("slipped off its body" in line for line in faults_of(fallen))
     assert {"distance_m", "misfit_m", "bridged_m", "gap_m", "strain_warp", "pressure_pa", "places"} <= set(entry)
 
 

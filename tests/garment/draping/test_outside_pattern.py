@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from bodies import body_of_size
 from devices import DEVICE
+from obj_files import write_obj
 from plain_patterns import sewn
 
 import warpflat
@@ -352,11 +353,8 @@ def test_a_half_is_lifted_to_both_sides_of_its_surface(tmp_path: Path):
     x, y = (each.ravel() for each in np.meshgrid(np.linspace(0.0, 0.157, 30), np.linspace(0.0, 0.2, 5)))
     space = np.column_stack([radius * np.sin(x / radius), y, radius * np.cos(x / radius)])
     i = np.arange(150).reshape(5, 30)
-    faces = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4) + 1
-    rows = [f"v {a} {b} {c}" for a, b, c in space] + [f"vt {a} {b}" for a, b in zip(x, y, strict=True)]
-    (tmp_path / "front.obj").write_text(
-        "\n".join([*rows, *("f " + " ".join(f"{v}/{v}" for v in face) for face in faces)])
-    )
+    faces = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    write_obj(tmp_path / "front.obj", (space, faces), texture=[np.stack([x, y], axis=1)], digits="")
     half = polygon("front", [(0.0, 0.0), (0.157, 0.0), (0.157, 0.2), (0.0, 0.2)])
     half = Piece(name="front", edges=[*half.edges[:3], Edge(name="fold", points=half.edges[3].points, kind="fold")])
     lifts = whole_lifts([half], {"front": read_lift(tmp_path / "front.obj")})

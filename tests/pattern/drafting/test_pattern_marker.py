@@ -11,7 +11,7 @@ from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
 from warpflat.pattern.drafting.draft import draft_garment
-from warpflat.pattern.drafting.layout import lay_out, nests, occupied_points
+from warpflat.pattern.drafting.layout import covered_rings, lay_out, nests
 from warpflat.pattern.drafting.marker import Cloth, cloth_needed, make_marker, unfold_piece
 from warpflat.pattern.drafting.piece_parts import Edge, Hole
 from warpflat.pattern.drafting.pieces import Pattern, Piece
@@ -134,7 +134,7 @@ def test_bad_cloth_and_names_are_refused(dress):
 
 def test_the_sheet_keeps_pieces_apart_and_sizes_together(dress):
     sheet = lay_out(nests(dress), width=1.0)
-    laid = [placed.on_sheet(occupied_points(placed.pieces)) for placed in sheet.placed]
+    laid = [placed.on_sheet(np.concatenate(covered_rings(placed.pieces))) for placed in sheet.placed]
     boxes = [shapely.MultiPoint(points).envelope for points in laid]
     for i, a in enumerate(boxes):
         assert all(a.distance(b) > 0.0099 for b in boxes[i + 1 :])

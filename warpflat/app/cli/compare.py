@@ -38,7 +38,7 @@ def compare(scene: Path, fabrics: tuple[str, ...], drape: bool, output: Output) 
       warpflat compare scenes/dress.toml --fabric cotton --fabric denim --drape
     """
     from warpflat.app.cli.progress_bar import ProgressBar
-    from warpflat.app.cli.tables import warnings_of
+    from warpflat.app.review.faults import faults_of
     from warpflat.app.scene.compare import compare_fabrics, compared_files, comparison_table, save_comparison
     from warpflat.app.scene.load import load_scene
     from warpflat.core import output_folder
@@ -58,7 +58,7 @@ def compare(scene: Path, fabrics: tuple[str, ...], drape: bool, output: Output) 
     warnings = [
         f"{fabric}: {line}"
         for fabric, pieces in comparison.results.items()
-        for line in warnings_of(
+        for line in faults_of(
             {
                 "pieces": {name: piece.measures for name, piece in pieces.items()},
                 **comparison.sewing[fabric],

@@ -94,12 +94,10 @@ def cuts(
     from warpflat.app.scene.as_toml import tables_as_toml
     from warpflat.app.scene.ledger import cuts_of_entry, scene_ledger, with_cut
     from warpflat.app.scene.run import files_of_run, run_scene
-    from warpflat.core import optional_file, output_folder, write_report
+    from warpflat.core import expect_files, optional_file, output_folder, write_report
     from warpflat.pattern import write_ledger_picture
 
-    on_form = loaded.settings.mannequin is not None
-    expected = ["ledger.json", "ledger.png", *(["cuts.toml"] if on_form else [])]
-    expected += files_of_run(loaded) if apply is not None else []
+    expected = ["ledger.json", "ledger.png", *(files_of_run(loaded) if apply is not None else [])]
     result, written = None, list[str]()
     with (
         ProgressBar(loaded.name, hidden=not output.tells) as bar,
@@ -109,8 +107,10 @@ def cuts(
         chosen = None if apply is None else ledger.entry(apply)
         with optional_file(folder / "ledger.png", written) as path:
             write_ledger_picture(path, ledger)
-        if on_form:
-            pasted = [tables_as_toml({"cuts": [entry.cut]}) for entry in ([chosen] if chosen else ledger.entries)]
+        listed = [entry.cut for entry in ([chosen] if chosen else ledger.entries) if entry.cut]
+        if listed:
+            expect_files(folder, ["cuts.toml"])
+            pasted = [tables_as_toml({"cuts": [cut]}) for cut in listed]
             _write_toml(folder, "Cuts, the best first: paste one into the scene.", pasted)
             written.append("cuts.toml")
         write_report(folder / "ledger.json", ledger.as_dict(), name="ledger", files=written)

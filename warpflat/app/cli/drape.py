@@ -77,7 +77,8 @@ def drape(
     from dataclasses import replace
 
     from warpflat.app.cli.summary import summary_lines
-    from warpflat.app.cli.tables import drape_lines, warnings_of
+    from warpflat.app.cli.tables import drape_lines
+    from warpflat.app.review.faults import faults_of
     from warpflat.app.scene.load import load_scene
     from warpflat.app.scene.outside_pattern import OutsideJob, drape_outside, edge_table, is_pattern_file
     from warpflat.app.scene.schema import DrapeTable
@@ -97,7 +98,7 @@ def drape(
             job, folder, fabric=fabric, shear_limit=shear_limit, size=size, device=output.device, usd=usd,
             correct=correct,
         )  # fmt: skip
-        warnings = warnings_of(result.metrics)
+        warnings = faults_of(result.metrics)
         # What was left out has a line of its own at the end.
         left = [note for note in result.notes if note not in result.metrics.get("notes", ())]
         for line in (*(left if output.tells else ()), *warnings):

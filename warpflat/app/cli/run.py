@@ -93,9 +93,10 @@ def report_run(result: SceneResult, folder: Path, output: Output) -> int:
     """Print the result of a run, and return the exit code."""
     from warpflat.app.cli.fit_lines import fit_lines
     from warpflat.app.cli.summary import notes_line, summary_lines
-    from warpflat.app.cli.tables import drape_lines, run_summary, warnings_of
+    from warpflat.app.cli.tables import drape_lines, run_summary
+    from warpflat.app.review.faults import faults_of
 
-    warnings = warnings_of(result.metrics)
+    warnings = faults_of(result.metrics)
     if output.tells:
         # What was left out has a line of its own at the end.
         printed = {*warnings, *result.metrics.get("notes", ())}

@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from warpflat.app.review.faults import faults_of
 from warpflat.app.review.film import open_film, pack_film, pack_foreign_film
 from warpflat.core import (
     InputError,
     atomic_path,
     energy_words,
-    format_count,
     guarded,
     latest_file,
     open_file,
@@ -304,23 +304,15 @@ def _cards(metrics: Mapping[str, Any]) -> str:
 
 
 def verdict_words(metrics: Mapping[str, Any]) -> str:
-    """Return the verdict as HTML: at rest or not, whether it fits and why not, and what a maker should know."""
-    pieces = metrics["pieces"]
-    flips = sum(piece["flipped_faces"] for piece in pieces.values())
-    unfinished = [name for name, piece in pieces.items() if not piece["converged"]]
-    overlap = sum(piece.get("overlap_m2", 0.0) for piece in pieces.values())
-    wrong = [
-        *([f"not at rest: {', '.join(unfinished)}"] if unfinished else []),
-        *([format_count(flips, "flipped face")] if flips else []),
-        *([f"{1e6 * overlap:.3g} mm² lie over each other"] if overlap else []),
-    ]
-    lines = [("bad", f"Not done: {'; '.join(wrong)}.")] if wrong else []
+    """Return the verdict as HTML: done or not, whether it fits and why not, and what a maker should know."""
+    faults = faults_of(metrics)
+    lines = [("bad", f"Not done: {_typeset(fault)}.") for fault in faults]
     verdict = metrics.get("verdict")
     findings = verdict["findings"] if verdict else []
     if verdict:
         words = verdict["words"]
         lines.append(("good" if verdict["fits"] else "bad", f"{words[0].upper()}{words[1:]}."))
-    if not wrong:
+    if not faults:
         lines.append(("good", "At rest, no flipped faces, no overlap."))
     if metrics.get("rings") and not any(finding["kind"] == "opening" for finding in findings):
         lines.append(("good", "It can be put on: every edge and level passes what of the body goes through it."))

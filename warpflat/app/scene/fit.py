@@ -376,7 +376,7 @@ def ease_wishes(texts: Sequence[str]) -> dict[str, float]:
     found: dict[str, float] = {}
     for text in texts:
         match = _LENGTH.fullmatch(text)
-        if match is None:
+        if match is None or not np.isfinite(float(match["value"])):
             raise InputError(f"--ease {quote_value(text)}: give a level and a length with its unit, as waist=40mm")
         if match["level"] not in EASE_LEVELS:
             raise InputError(f"--ease {quote_value(text)}: level {nearest(match['level'], EASE_LEVELS)}")

@@ -274,10 +274,9 @@ class Film:
         self._open = ExitStack()
         self._keys: KeyFile | None = None
         self._folder, self._output = folder, output
-        self._most = max(_MOST_VERTICES // max(sum(len(surface.vertices) for surface in surfaces), 1), 3)
-        self.wanted = output.frames > 0
         self._surfaces = {surface.name: surface for surface in surfaces}
         vertices = sum(len(surface.vertices) for surface in surfaces)
+        self._most = max(_MOST_VERTICES // max(vertices, 1), 3)
         self._all_stored = not output.compact_film and vertices * max(output.frames, 1) <= _MOST_STORED
         schedule = partial(FrameSchedule, output, at_most=self._most)
         self.recorders = {name: FrameRecorder(surface, schedule) for name, surface in self._surfaces.items()}
@@ -288,7 +287,7 @@ class Film:
         Raises:
             InputError: the place cannot be written.
         """
-        if self.wanted:
+        if self._output.frames > 0:
             with optional_file(self._folder / "frames.usdc", []):
                 self._keys = self._open.enter_context(KeyFile(self._folder))
                 for recorder in self.recorders.values():

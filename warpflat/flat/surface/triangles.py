@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.flat.surface.connectivity import join_labels
 from warpflat.flat.surface.half_edges import four_columns
 
 __all__ = ["corner_triangles", "selected_rows", "triangulate", "unfold_quad_diagonals"]
@@ -71,16 +72,14 @@ def _distinct_diagonals(faces: IntArray, is_quad: BoolArray, turn: BoolArray) ->
     if not (ordered[1:] == ordered[:-1]).any() and not are_sides(ordered).any():
         return turn
     from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
+    from scipy.sparse.csgraph import maximum_bipartite_matching
 
     known, column = np.unique(both, return_inverse=True)
     column = column.reshape(-1, 2)
     free = ~are_sides(known)
     used = np.bincount(column[np.arange(len(rows)), turn[rows].astype(np.int64)], minlength=len(known))
     amiss = (used > 1) | ((used > 0) & ~free)
-    shape = len(rows) + len(known), len(rows) + len(known)
-    ends = np.repeat(np.arange(len(rows)), 2), len(rows) + column.ravel()
-    _, part = connected_components(coo_array((np.ones(column.size), ends), shape=shape), directed=False)
+    part = join_labels(len(rows) + len(known), np.repeat(np.arange(len(rows)), 2), len(rows) + column.ravel())
     near = np.flatnonzero(np.isin(part[: len(rows)], part[len(rows) :][amiss]))
     open_to = free[column[near]]
     at, slot = np.nonzero(open_to)

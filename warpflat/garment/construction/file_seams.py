@@ -186,14 +186,14 @@ class _Sides:
         Two slits are one seam where the gap between their ends is short against both, and both run straight on across it.
         """
         from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components, dijkstra
+        from scipy.sparse.csgraph import dijkstra
 
         if not len(seams):
             return seams
         count = len(self._place)
         tail, head = self._place[self.tail], self._place[self.head]
         a, b = tail[seams[:, 0]], head[seams[:, 0]]
-        part = connected_components(coo_array((np.ones(len(a)), (a, b)), shape=(count, count)), directed=False)[1]
+        part = join_labels(count, a, b)
         long = np.bincount(part[a], self.length[seams[:, 0]], minlength=int(part.max()) + 1)
         # Slits end where one of their edges does, and no border is.
         alone = np.ones(len(tail), dtype=bool)

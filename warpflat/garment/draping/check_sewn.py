@@ -72,7 +72,7 @@ def check_sewn(
             if limb
             else not (any(found.values()) or buttoned)
         )
-        if wrong and opening.turn > -np.pi:
+        if wrong and not opening.is_hole:
             raise StepError(
                 f"piece {min(opening.pieces)!r}: its opening of {1e3 * opening.length:.0f} mm was sewn beside the "
                 f"{limb or 'body'} instead of around it: {_REMEDY}"

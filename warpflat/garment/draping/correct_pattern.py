@@ -17,7 +17,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array
+from scipy.sparse import csc_array
 
 from warpflat.core import (
     FloatArray,
@@ -51,8 +51,6 @@ __all__ = ["Correction", "Round", "correct_pattern", "relieve_pattern"]
 
 # Shear counts at least as this share of the threads' stiffness: a pattern that shears freely gets a ragged outline.
 _LEAST_SHEAR = 0.05
-# Weight of equal changes on both sides of a seam, over the threads' stiffness; and of what holds a piece as a whole.
-_SEAM, _HOLD = 1e3, 1e-8
 # A round that lowers the misfit by less than this share is the last; a step that does not lower it is halved so often.
 _LEAST_GAIN, _HALVINGS = 0.02, 2
 # Cloth that is stretched too far is let out to this share of its limit.
@@ -323,11 +321,11 @@ def _follow(
         * rows
     )
     count, columns = 2 * len(cloth.flat), 2 * corner_flat[:, :, None] + np.arange(2)
-    matrix, mending = hold_seams(cloth.flat, seams, difference, _SEAM * threads)
+    matrix, mending = hold_seams(cloth, seams, difference)
     matrix = matrix + cell_matrix(np.einsum("scia,scjb->ciajb", stiff, rows), columns, columns, (count, count))
     right = np.zeros(count)
     np.add.at(right, columns, np.einsum("scia,cs->cia", stiff, wanted))
-    solve = factor_symmetric(csc_array(matrix + diags_array(np.full(count, _HOLD * threads))))
+    solve = factor_symmetric(csc_array(matrix))
     return solve(mending).reshape(-1, 2), solve(right).reshape(-1, 2)
 
 

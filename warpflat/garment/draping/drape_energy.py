@@ -34,6 +34,8 @@ __all__ = ["DrapeEnergy"]
 # Stiffness of the body's skin and of friction that holds, per area [N/m3]. The body carries what presses at no depth; these
 # only hold back what changes.
 _SKIN, _GRIP = 1e6, 1e5
+# Where the depth does not fall from round to round, the skin becomes so many times as stiff.
+_STIFFER = 4.0
 # A vertex that nothing holds moves by its weight over this stiffness, so that no step of the minimisation is longer [m]
 _LONGEST_STEP = 0.05
 # and no step of dynamic relaxation longer than this [m].
@@ -83,7 +85,7 @@ class DrapeEnergy:
         )
         self.contact = contact = Contact()
         contact.centre, contact.normal, contact.rubbed, contact.anchor = (self._zeros(wp.vec3d) for _ in range(4))
-        contact.pressed, contact.most = self._zeros(wp.float64), self._zeros(wp.float64)
+        contact.pressed, contact.most, contact.depth = (self._zeros(wp.float64) for _ in range(3))
         contact.friction, contact.longest_step = options.friction, _LONGEST_EXPLICIT_STEP
         contact.skin, contact.grip = (self._on(each * vertex_area, wp.float64) for each in (_SKIN, _GRIP))
         bending = Bending()
@@ -155,10 +157,13 @@ class DrapeEnergy:
         self._each(load_contact, [self.motion, self.contact, *self.forces_of])
         self._each(anchor_friction, [self.motion, self.contact])
 
-    def carry_contact(self, positions: FloatArray) -> None:
-        """Take over the forces of body and friction at #V by 3 places [m], lay the cloth on its planes, and find the planes anew."""
+    def carry_contact(self, positions: FloatArray, *, at_rest: bool) -> None:
+        """Take over the forces of body and friction at #V by 3 places [m], lay the cloth on its planes, and find the planes anew.
+
+        Where cloth at rest still presses as deep into the skin, the skin becomes stiffer.
+        """
         self.motion.position.assign(positions)
-        self._each(carry_contact, [self.motion, self.contact])
+        self._each(carry_contact, [self.motion, self.contact, _STIFFER if at_rest else 1.0])
         self._renew.launch()
         self._each(anchor_friction, [self.motion, self.contact])
 
@@ -177,6 +182,10 @@ class DrapeEnergy:
         self._evaluate.launch()
         energy = float(self._cell_energy.numpy().sum() + self._energy.numpy().sum())
         return Point(positions=positions, energy=energy, gradient=-self._force.numpy())
+
+    def mean_force(self, point: Point) -> float:
+        """Return the mean force that is left at a vertex, over its mean weight."""
+        return float(np.linalg.norm(point.gradient, axis=1).mean() / self.weight.mean())
 
     def factor(self, positions: FloatArray, *, near: bool) -> None:
         """Factor the stiffness of the cloth somewhere, from where on it is the metric.

@@ -15,13 +15,13 @@ from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.options import DrapeOptions
-from warpflat.garment.draping.relax_drape import relax_drape
+from warpflat.garment.draping.relax_drape import DrapedCloth, relax_drape
 from warpflat.garment.draping.result import Drape
 from warpflat.garment.draping.sewn_cloth import SewnCloth, pieces_of, sew_cloth
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.pattern import MIRRORED
 
-__all__ = ["drape", "held_vertices", "hip_level", "thread_elastics"]
+__all__ = ["come_to_rest", "drape", "held_vertices", "hip_level", "thread_elastics"]
 
 # So often is what an elastic draws in moved towards the body, level.
 _LEVELLED = 20
@@ -71,12 +71,7 @@ def drape(
         cloth, gripped = thread_elastics(cloth, elastics, solid)
         designed = Body(cloth.designed, cloth.faces, device=where)
     options = options or DrapeOptions()
-    held, frames = held_vertices(cloth, [*hold, *gripped]), list[NDArray[np.float32]]()
-    worn = relax_drape(
-        cloth, solid, options=options, held=held, callback=callback,
-        observer=lambda places: frames.append(places.astype(np.float32)),
-    )  # fmt: skip
-    worn.check_held()
+    worn, frames = come_to_rest(cloth, solid, [*hold, *gripped], options, callback)
     sources = tuple(source for piece in pieces_of(garment).values() for source in piece.surface.sources)
     # A cut that `warpflat.advise` has found on one side stands for that on the other side of the body, too.
     cuts = {}
@@ -84,9 +79,30 @@ def drape(
         paths = [(remedy.words.partition(",")[0], piece.surface.vertices[remedy.path]) for remedy in piece.remedies]
         cuts[name] = [(words, np.concatenate([path, path * [-1.0, 1.0, 1.0]])) for words, path in paths]
     return Drape(
-        cloth=cloth, worn=worn, body=solid, designed=designed, options=options, sources=sources, frames=tuple(frames),
+        cloth=cloth, worn=worn, body=solid, designed=designed, options=options, sources=sources, frames=frames,
         hangs_below=hip_level(garment.mannequin if isinstance(garment, FormGarment) else None), cuts=cuts, threaded=gripped,
     )  # fmt: skip
+
+
+def come_to_rest(
+    cloth: SewnCloth,
+    body: Body,
+    hold: Sequence[str],
+    options: DrapeOptions,
+    callback: Callable[[int, float], None] | None,
+) -> tuple[DrapedCloth, tuple[NDArray[np.float32], ...]]:
+    """Relax sewn cloth on a body, held as in :func:`drape`; return it, and where it was on its way (#V by 3 each [m]).
+
+    Raises:
+        InputError: an unknown line, or nothing holds the garment.
+    """
+    frames = list[NDArray[np.float32]]()
+    worn = relax_drape(
+        cloth, body, options=options, held=held_vertices(cloth, hold), callback=callback,
+        observer=lambda places: frames.append(places.astype(np.float32)),
+    )  # fmt: skip
+    worn.check_held()
+    return worn, tuple(frames)
 
 
 def held_vertices(cloth: SewnCloth, hold: Sequence[str]) -> BoolArray:

@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 import shapely
 import warp as wp
-from numpy.typing import NDArray
 
 from warpflat.core import FloatArray, InputError, nearest, polyline_length, reflected, short_repr, start_warp
 from warpflat.flat import Fabric, Surface, triangulate, vertex_normals
@@ -17,14 +16,13 @@ from warpflat.garment.construction.mirror import mirror_plane
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.check_sewn import check_sewn
 from warpflat.garment.draping.continue_pieces import continue_pieces, hang_from_edges, hood_beside_head
-from warpflat.garment.draping.drape_garment import held_vertices, hip_level, thread_elastics
+from warpflat.garment.draping.drape_garment import come_to_rest, hip_level, thread_elastics
 from warpflat.garment.draping.lay_around import Laid, lay_around
 from warpflat.garment.draping.lift import Lift, surface_lift, whole_lifts
 from warpflat.garment.draping.limbs import limb_lines, on_arm
 from warpflat.garment.draping.mesh_pieces import FlatMesh, MeshedPieces, Weld, mesh_pieces, sew_meshes
 from warpflat.garment.draping.openings import Opening, find_openings
 from warpflat.garment.draping.options import DrapeOptions
-from warpflat.garment.draping.relax_drape import relax_drape
 from warpflat.garment.draping.result import Drape
 from warpflat.garment.draping.sew_around import sew_around
 from warpflat.garment.draping.sewn_cloth import SewnCloth, worn_surface
@@ -168,12 +166,7 @@ def drape_pattern(
     cloth, gripped = thread_elastics(cloth, threaded, solid)
     if gripped:
         notes.append(f"held by an elastic: {', '.join(threaded)}")
-    held, frames = held_vertices(cloth, [*placement.hold, *gripped]), list[NDArray[np.float32]]()
-    worn = relax_drape(
-        cloth, solid, options=options, held=held, callback=callback,
-        observer=lambda places: frames.append(places.astype(np.float32)),
-    )  # fmt: skip
-    worn.check_held()
+    worn, frames = come_to_rest(cloth, solid, [*placement.hold, *gripped], options, callback)
     if not lifted:
         # What it should lie on is the body below it.
         cloth, designed = replace(cloth, designed=solid.nearest(worn.positions)[0]), solid
@@ -183,7 +176,7 @@ def drape_pattern(
         body=solid,
         designed=designed,
         options=options,
-        frames=tuple(frames),
+        frames=frames,
         drafted=drafted,
         hangs_below=hip_level(body),
         threaded=gripped,

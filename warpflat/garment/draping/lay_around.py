@@ -26,8 +26,6 @@ from warpflat.garment.mannequin.mannequin import Mannequin
 
 __all__ = ["Laid", "lay_around"]
 
-# An opening that turns by nearly a full turn goes around a hole in the cloth, as of a pocket, unless it is so long [m].
-_HOLE, _LONG = -1.9 * np.pi, 0.4
 # An opening that is longer than so many times the body's waist, beside those of two limbs, runs along a front that is open.
 _OPEN_FRONT = 2.0
 # The edge of a hood rises so far [m] from the throat to the crown (hoods .22 and .34, a collar with its placket .16, necks up to .06), and
@@ -185,7 +183,7 @@ def _kinds(openings: Sequence[Opening], far: FloatArray, up: FloatArray, waist: 
     """
     length = np.array([each.length for each in openings])
     apart = np.array([[row[each.vertices].min() for each in openings] for row in far])
-    open_ones = [k for k, each in enumerate(openings) if each.turn > _HOLE or each.length > _LONG]
+    open_ones = [k for k, each in enumerate(openings) if not each.is_hole]
     # The longest five are those of limbs.
     found = open_ones[:5] if len(open_ones) > 1 else list(range(min(2, len(openings))))
 

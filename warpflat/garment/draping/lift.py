@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from warpflat.core import FARTHEST, FloatArray, InputError, IntArray, reading, reflected, turned_left, unit
+from warpflat.flat import read_mesh_file
 from warpflat.pattern import MIRRORED, Piece
 
 __all__ = ["Lift", "moved_lift", "read_lift", "surface_lift", "whole_lifts"]
@@ -28,29 +29,19 @@ def read_lift(path: Path) -> Lift:
     Raises:
         InputError: the file cannot be read, or has no pattern.
     """
-    space, flat, faces = [], [], []
-    with reading(path, "piece") as place:
-        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
-            place.at = f"line {number}"
-            key, *words = line.split()[:5] or [""]
-            if key == "v":
-                space.append([float(word) for word in words[:3]])
-            elif key == "vt":
-                flat.append([float(word) for word in words[:2]])
-            elif key == "f":
-                corners = [[int(part) - 1 for part in word.split("/")[:2]] for word in words]
-                faces += [[corners[0], corners[k], corners[k + 1]] for k in range(1, len(corners) - 1)]
-        place.at = ""
-        if not faces:
-            raise InputError("has no faces 'f v/vt'; run the scene again")
-        triangles = np.array(faces, dtype=np.int64).reshape(-1, 3, 2)
-        # A run writes no negative numbers, which NumPy would count from the end.
-        if triangles.min() < 0:
-            raise InputError("refers to a vertex before its first; run the scene again")
-        surface, pattern = np.array(space)[triangles[:, :, 0]], np.array(flat)[triangles[:, :, 1]]
-        if not (np.abs(surface).max() < FARTHEST and np.abs(pattern).max() < FARTHEST):
+    with reading(path, "piece"):
+        _, mesh, _, _ = read_mesh_file(path, units="m", prim=None, name=None)
+        polygons, texture = mesh.polygons, mesh.texture
+        if texture is None or np.isnan(texture[polygons >= 0]).any():
+            raise InputError("has faces without a pattern, 'f v/vt'; run the scene again")
+        if not max(np.abs(mesh.vertices).max(), np.abs(texture[polygons >= 0]).max()) < FARTHEST:
             raise InputError(f"a vertex lies farther than {FARTHEST:g} m off; run the scene again")
-        return _lift(surface, pattern)
+        surface, pattern = [], []
+        for k in range(1, polygons.shape[1] - 1):
+            fan, rows = [0, k, k + 1], polygons[:, k + 1] >= 0
+            surface.append(mesh.vertices[polygons[rows][:, fan]])
+            pattern.append(texture[rows][:, fan])
+        return _lift(np.concatenate(surface), np.concatenate(pattern))
 
 
 def surface_lift(space: FloatArray, flat: FloatArray, triangles: IntArray) -> Lift:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import coo_array, csr_array, diags_array
 
 from warpflat.core import FloatArray, IntArray, reflected, turned_left, unit
 from warpflat.flat import Flattening, corner_triangles
@@ -27,6 +27,8 @@ __all__ = [
 
 # No cell shrinks below this share of its area in a step.
 _LEAST_AREA = 0.5
+# Weight of equal changes on both sides of a seam, over the threads' stiffness; and of what holds a piece as a whole.
+_SEAM, _HOLD = 1e3, 1e-8
 
 
 def seam_edges(cloth: SewnCloth) -> IntArray:
@@ -51,23 +53,24 @@ def seam_differences(flat: FloatArray, seams: IntArray) -> FloatArray:
     return edge_lengths(flat, seams[:, 0]) - edge_lengths(flat, seams[:, 1])
 
 
-def hold_seams(
-    flat: FloatArray, seams: IntArray, difference: FloatArray, weight: float
-) -> tuple[csr_array, FloatArray]:
+def hold_seams(cloth: SewnCloth, seams: IntArray, difference: FloatArray) -> tuple[csr_array, FloatArray]:
     """Return a stiffness of the flat vertices (2 #P by 2 #P) and the forces (2 #P) that give the sides of seams their wanted difference.
 
+    Each piece as a whole is held, too, softly.
+
     Args:
-        flat: #P by 2 [m].
+        cloth: whose flat vertices move.
         seams: see `seam_edges`.
         difference: #S [m].
-        weight: of the square of each difference.
     """
+    flat, threads = cloth.flat, 0.5 * (cloth.fabric.stiffness_warp + cloth.fabric.stiffness_weft)
     # The change of the difference by the displacement of the vertices, #S by 2 #P.
     along = unit(flat[seams[:, :, 1]] - flat[seams[:, :, 0]]) * [[1.0], [-1.0]]
     values, columns = np.stack([-along, along], axis=2), 2 * seams[..., None] + np.arange(2)
     places = (np.repeat(np.arange(len(seams)), 8), columns.ravel())
     change = coo_array((values.ravel(), places), shape=(len(seams), 2 * len(flat))).tocsr()
-    return weight * (change.T @ change), weight * (change.T @ (difference - seam_differences(flat, seams)))
+    matrix = _SEAM * (change.T @ change) + diags_array(np.full(2 * len(flat), _HOLD))
+    return threads * matrix, _SEAM * threads * (change.T @ (difference - seam_differences(flat, seams)))
 
 
 def cell_matrix(blocks: FloatArray, rows: IntArray, columns: IntArray, shape: tuple[int, int]) -> csr_array:

@@ -14,6 +14,9 @@ from warpflat.garment.draping.sewn_cloth import SewnCloth
 
 __all__ = ["Opening", "find_openings"]
 
+# An opening that turns by nearly a full turn goes around a hole in the cloth, as of a pocket, unless it is so long [m].
+_HOLE, _LONG = -1.9 * np.pi, 0.4
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Opening:
@@ -30,6 +33,11 @@ class Opening:
     length: float
     pieces: frozenset[str]
     turn: float
+
+    @property
+    def is_hole(self) -> bool:
+        """Whether it is a hole in the cloth, through which nothing goes."""
+        return self.turn <= _HOLE and self.length <= _LONG
 
 
 def find_openings(cloth: SewnCloth, buttons: Sequence[Weld] = ()) -> list[Opening]:

@@ -39,8 +39,8 @@ from warpflat.garment.draping.sewn_cloth import SewnCloth, sew_cloth
 
 __all__ = ["Recovery", "recover_cloth", "recover_pattern"]
 
-# Of the step: what holds back the cloth's strain, and the seams' difference, over the cloth's stiffness; what holds a piece as a whole.
-_DAMPING, _SEAM, _HOLD = 1e-2, 1e3, 1e-8
+# What holds back the cloth's strain in a step, over the cloth's stiffness.
+_DAMPING = 1e-2
 # The pattern is found when a step strains it by less than this on the mean.
 _LEAST_STRAIN = 2e-5
 # Strain up to which cloth under pressure counts as taut.
@@ -106,7 +106,7 @@ def recover_cloth(
     while len(strains) < steps and not converged:
         # Newton's method for the places of the cloth at rest and the displacement of its flat vertices.
         energy = DrapeEnergy(cloth, None, options, held)
-        x, threads = cloth.designed, 0.5 * (cloth.fabric.stiffness_warp + cloth.fabric.stiffness_weft)
+        x = cloth.designed
         force = -energy.at(x).gradient
         corner_flat, face, _ = corner_triangles(cloth.flat_faces)
         # The deformation gradient F of the designed shape, in the coordinates of the plane, #C by 3 by 2.
@@ -125,9 +125,8 @@ def recover_cloth(
         free = diags_array(np.repeat((~held).astype(np.float64), 3))
         jacobian = free @ cell_matrix(by_flat, rows, columns, (space, flat))
         damping = _DAMPING * cell_matrix(in_plane, columns, columns, (flat, flat))
-        sides, right = hold_seams(cloth.flat, seams, difference, _SEAM * threads)
-        damping = damping + sides + diags_array(np.full(flat, _HOLD * threads))
-        matrix = csc_array(block_array([[energy.stiffness(taut), -jacobian], [-jacobian.T, -damping]]))
+        sides, right = hold_seams(cloth, seams, difference)
+        matrix = csc_array(block_array([[energy.stiffness(taut), -jacobian], [-jacobian.T, -(damping + sides)]]))
         found = factor_symmetric(matrix)(np.concatenate([force.ravel(), -right]))
         off, u = np.linalg.norm(found[:space].reshape(-1, 3), axis=1), found[space:].reshape(-1, 2)
         moved = replace(cloth, flat=cloth.flat + largest_share(cloth, u) * u)

@@ -52,7 +52,9 @@ _MOST_ROUNDS, _STEPS_PER_ROUND = 80, 40
 _MEMORY = 20
 # A round ends when the mean force is at most this share of what is allowed; rest is near from so many times that on.
 _ROUND_ENDS, _NEARLY_AT_REST = 0.4, 20.0
-# It goes on while a hundred steps of it leave less than this share.
+# The rounds end when, on planes found anew, the mean force is at most so many times what is allowed.
+_SETTLED = 5.0
+# Dynamic relaxation goes on while a hundred steps of it leave less than this share.
 _EASES = 0.8
 # A round, or a hundred steps, gains if it leaves less than this share of the least force so far. After so many rounds without gain the
 # rounds end, and after so many steps of dynamic relaxation beside them the cloth is given up.
@@ -208,10 +210,14 @@ def relax_drape(
                 energy.load_contact()
             rounds += 1
             left = _minimise(energy, options.tolerance, near=left <= _NEARLY_AT_REST * options.tolerance)
-            observe(energy.motion.position.numpy())
-            fell_off = float(energy.motion.position.numpy()[:, 1].max()) < lowest
-            least_left, gained_round = (left, rounds) if left < _GAINS * least_left else (least_left, gained_round)
-            if left <= options.tolerance:
+            places = energy.motion.position.numpy().copy()
+            carried = energy.mean_force(energy.at(places))
+            observe(places)
+            fell_off = float(places[:, 1].max()) < lowest
+            least_left, gained_round = (
+                (carried, rounds) if carried < _GAINS * least_left else (least_left, gained_round)
+            )
+            if left <= options.tolerance and carried <= _SETTLED * options.tolerance:
                 break
     return DrapedCloth(
         positions=energy.motion.position.numpy().copy(), pressing=relaxation.pressing.numpy().copy(),
@@ -233,13 +239,13 @@ def _minimise(energy: DrapeEnergy, tolerance: float, *, near: bool) -> float:
     """
     x = energy.motion.position.numpy().copy()
     energy.bound(x, _LONGEST_ROUND)
-    weight, left = float(energy.weight.mean()), np.inf
     energy.factor(x, near=near)
     descent = Descent(energy, energy.at(x), memory=_MEMORY)
+    left = np.inf
     while descent.iterations < _STEPS_PER_ROUND and left > _ROUND_ENDS * tolerance and descent.step():
-        left = float(np.linalg.norm(descent.point.gradient, axis=1).mean()) / weight
-    point = descent.point
-    energy.carry_contact(point.positions)
+        left = energy.mean_force(descent.point)
+    left = energy.mean_force(descent.point)
+    energy.carry_contact(descent.point.positions, at_rest=left <= tolerance)
     energy.renew_layers()
     energy.motion.velocity.zero_()
-    return float(np.linalg.norm(point.gradient, axis=1).mean()) / weight
+    return left

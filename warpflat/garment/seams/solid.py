@@ -24,11 +24,11 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import connected_components, dijkstra, minimum_spanning_tree
+from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
 from warpflat.core import FloatArray, IntArray
-from warpflat.flat import border_loops, euler_characteristic, half_edges, inner_borders, tube_borders
+from warpflat.flat import border_loops, euler_characteristic, half_edges, inner_borders, join_labels, tube_borders
 from warpflat.garment.seams.anatomy import HOLE, Anatomy
 from warpflat.garment.seams.cloth import Cloth, PieceMesh, section
 from warpflat.garment.seams.fields import Operators
@@ -543,8 +543,7 @@ def _across_neck(mesh: PieceMesh, neck: FloatArray) -> _Way:
     # Of what lies beyond the plane, only the part at the neck.
     a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     passed = (field[a] > 0.0) & (field[b] > 0.0)
-    graph = coo_array((np.ones(int(passed.sum())), (a[passed], b[passed])), shape=(len(points),) * 2)
-    _, label = connected_components(graph, directed=False)
+    label = join_labels(len(points), a[passed], b[passed])
     ahead = np.flatnonzero(field > 0.0)
     if len(ahead):
         own = label == label[ahead[np.linalg.norm(points[ahead] - middle, axis=1).argmin()]]

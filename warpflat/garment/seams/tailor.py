@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core import BoolArray, FloatArray, reflected
-from warpflat.flat import components
+from warpflat.flat import components, join_labels
 from warpflat.garment.seams.anatomy import Anatomy, Limb
 from warpflat.garment.seams.cloth import Cloth, edge_components, section
 from warpflat.garment.seams.fields import Operators
@@ -448,13 +448,9 @@ def _open_sleeve(cloth: Cloth, ahead: BoolArray, number: int, limb: Limb, low: I
 
 def _reached(faces: Ids, allowed: BoolArray, seeds: Ids) -> BoolArray:
     """Return #V, the vertices that are reached from seeds along edges between allowed ones."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     a, b = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     passable = allowed[a] & allowed[b]
-    graph = coo_array((np.ones(passable.sum()), (a[passable], b[passable])), shape=(len(allowed),) * 2)
-    _, label = connected_components(graph, directed=False)
+    label = join_labels(len(allowed), a[passable], b[passable])
     found = np.isin(label, label[seeds[allowed[seeds]]]) & allowed
     return np.asarray(found)
 
@@ -468,9 +464,6 @@ def tidied(cloth: Cloth, level: str, within: BoolArray, *, keep: float = _ISLAND
         within: #F, the faces in which islands are looked for.
         keep: share of the area from which a part is no island.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     f, faces = cloth.values[level], cloth.faces[within]
     if len(faces) == 0:
         return cloth
@@ -478,8 +471,7 @@ def tidied(cloth: Cloth, level: str, within: BoolArray, *, keep: float = _ISLAND
     used = mass > 0.0
     a, b = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     same = (f[a] > 0.0) == (f[b] > 0.0)
-    graph = coo_array((np.ones(same.sum()), (a[same], b[same])), shape=(len(f),) * 2)
-    _, label = connected_components(graph, directed=False)
+    label = join_labels(len(f), a[same], b[same])
     area = np.bincount(label, mass)
     small = used & (area[label] < keep * mass.sum())
     if not small.any():

@@ -12,11 +12,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError
+from warpflat.core import FloatArray, InputError, unit
 from warpflat.pattern.drafting.dart_allowance import dart_allowance
 from warpflat.pattern.drafting.hem_allowance import fold_hem
 from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT
-from warpflat.pattern.drafting.polygons import LOST, close_slits, half_plane, intersection, union, unit_vector
+from warpflat.pattern.drafting.polygons import (
+    LOST,
+    close_slits,
+    half_plane,
+    intersection,
+    outer_ring,
+    union,
+)
 from warpflat.pattern.drafting.sides import MITRE_REACH, Side, Wedge, allowance_strip, corner_fill, outline_points
 
 if TYPE_CHECKING:
@@ -73,7 +80,7 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
         elif (hem := fold_hem(sides, strips, index, after, body)) is not None:
             parts += hem
         elif isinstance(follows := sides[after], Side):
-            a, b = unit_vector(side.points[-1] - side.points[-2]), unit_vector(follows.points[1] - follows.points[0])
+            a, b = unit(side.points[-1] - side.points[-2]), unit(follows.points[1] - follows.points[0])
             fill = corner_fill(side.points[-1], a, b, side.width, follows.width)
             parts += [] if fill is None else [fill]
     whole = close_slits(union([*parts, *strips]))
@@ -92,8 +99,7 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
     pockets = [shapely.Polygon(ring) for ring in polygon.interiors]
     if any(pocket.area > 1e-6 for pocket in pockets):
         notes.append("allowances on two sides of a narrow gap meet and close it: make them narrower there")
-    ring = shapely.simplify(shapely.Polygon(polygon.exterior), 2e-6)
-    points = np.asarray(shapely.orient_polygons(ring).exterior.coords)[:-1]
+    points = outer_ring(shapely.simplify(shapely.Polygon(polygon.exterior), 2e-6))
     return CutOutline(points=points, notes=tuple(notes), prolonged=prolonged)
 
 
@@ -117,4 +123,4 @@ def cut_hole(ring: FloatArray, width: float) -> FloatArray | None:
     inner = intersection(inner, wide)
     if inner.geom_type != "Polygon" or inner.area <= LOST:
         return None
-    return np.asarray(shapely.orient_polygons(shapely.simplify(inner, 2e-6)).exterior.coords)[:-1]
+    return outer_ring(shapely.simplify(inner, 2e-6))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, points_at_lengths
+from warpflat.core import FloatArray, InputError, points_at_lengths, unit
 from warpflat.pattern.drafting.hem_allowance import HEM_SLANT
 from warpflat.pattern.drafting.polygons import (
     GRID,
@@ -20,7 +20,6 @@ from warpflat.pattern.drafting.polygons import (
     reflect,
     rotation,
     union,
-    unit_vector,
 )
 from warpflat.pattern.drafting.sides import MITRE_REACH, Side, Wedge
 
@@ -56,8 +55,8 @@ def dart_allowance(
     mouth_left, mouth_right = wedge.left[0], wedge.right[-1]
     on_left, on_right = _prolonged_legs(wedge, left, right)
     along_left, along_right = (
-        unit_vector(left.points[-1] - left.points[-2]),
-        -unit_vector(right.points[1] - right.points[0]),
+        unit(left.points[-1] - left.points[-2]),
+        -unit(right.points[1] - right.points[0]),
     )
     strips[before], end_left = _end_at_leg(strips[before], left.width, mouth_left, on_left, along_left, mouth_right)
     strips[after], end_right = _end_at_leg(strips[after], right.width, mouth_right, on_right, along_right, mouth_left)
@@ -86,7 +85,7 @@ def _prolonged_legs(wedge: Wedge, left: Side, right: Side) -> tuple[FloatArray, 
     They run straight on, but bend at a hem so that it folds up flat: what is turned up is then as long, from side to
     side, as what it lies on. Both legs bend by the same angle, so that the wedge can be folded on its middle.
     """
-    to_left, to_right = unit_vector(wedge.left[0] - wedge.tip), unit_vector(wedge.right[-1] - wedge.tip)
+    to_left, to_right = unit(wedge.left[0] - wedge.tip), unit(wedge.right[-1] - wedge.tip)
     if not left.kind == right.kind == "hem":
         return to_left, to_right
     depth = max(left.width, right.width)
@@ -115,7 +114,7 @@ def _half_cap(
     """
     import shapely
 
-    tip, near = wedge.tip, unit_vector(mouth - wedge.tip)
+    tip, near = wedge.tip, unit(mouth - wedge.tip)
     ends = [tip + radius * near, tip + radius * wedge.middle]
     half: Geometry = shapely.Polygon([tip, *ends])
     outwards = normal_towards(near, -wedge.middle)
@@ -167,4 +166,4 @@ def _end_at_leg(
 
 def _secant_direction(line: FloatArray, length: float) -> FloatArray:
     """Return the unit vector from a line's first point to the one at `length` [m] along it, or to its last."""
-    return unit_vector(points_at_lengths(line, length) - line[0])
+    return unit(points_at_lengths(line, length) - line[0])

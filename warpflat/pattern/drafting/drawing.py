@@ -19,7 +19,7 @@ from warpflat.pattern.drafting.measures import name_in_units
 from warpflat.pattern.drafting.piece_parts import HEMMED_LEVELS, LEFT_OUT
 from warpflat.pattern.drafting.placement import LabelRoom, Spot, spots_along
 from warpflat.pattern.drafting.polygons import parallelogram
-from warpflat.pattern.drafting.words import translate, translate_name
+from warpflat.pattern.drafting.words import as_sentence, translate, translate_name
 
 if TYPE_CHECKING:
     from shapely import Geometry
@@ -128,9 +128,9 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
             slits = [shapely.LineString(stroke.points) for stroke in others if stroke.role == "notch"]
             # It names all sizes in place of its own, no wider than it is.
             one, every = translate("size {size}", size=piece.size), translate("sizes {sizes}", sizes=sizes)
-            text, rows = every[0].upper() + every[1:], label.words()
+            text, rows = as_sentence(every), label.words()
             for number, row in enumerate(rows):
-                if row.text == one[0].upper() + one[1:]:
+                if row.text == as_sentence(one):
                     height = row.height * min(1.0, label.width / text_width(text, row.height))
                     rows[number] = replace(row, text=text, height=height)
             written = _Annotations(piece, label, rows, paper, borders=False, slits=slits)

@@ -14,7 +14,7 @@ from warpflat.core import FloatArray, size_words
 from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.pieces import Piece
 from warpflat.pattern.drafting.polygons import rotation
-from warpflat.pattern.drafting.words import translate
+from warpflat.pattern.drafting.words import as_sentence, translate
 
 if TYPE_CHECKING:
     from reportlab.pdfbase.ttfonts import TTFont
@@ -42,8 +42,6 @@ __all__ = [
 FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
 #: Height of capitals over the font's size.
 CAPITALS = 0.729
-#: Width over the font's size of letters that the font lacks: in other fonts they are no wider than their body.
-UNKNOWN = 1.0
 #: Height of capitals [m]: the piece's name, the other lines; and the distance of lines as a multiple of it.
 TITLE, TEXT, LEADING = 0.007, 0.0045, 1.55
 #: Height of letters with tails below, over that of capitals.
@@ -95,8 +93,9 @@ def embedded_font(name: str) -> TTFont:
 
 def text_width(text: str, height: float, *, bold: bool = False) -> float:
     """Return the width [m] of one line whose capitals are `height` [m] high."""
-    widths = embedded_font(BOLD if bold else FONT).face.charWidths  # in thousandths of the font's size
-    return sum(widths.get(ord(letter), 1000 * UNKNOWN) / 1000 for letter in text) * height / CAPITALS
+    # In thousandths of the font's size; letters that the font lacks are, in other fonts, no wider than their body.
+    widths = embedded_font(BOLD if bold else FONT).face.charWidths
+    return sum(widths.get(ord(letter), 1000) / 1000 for letter in text) * height / CAPITALS
 
 
 def wrap_text(text: str, height: float, width: float, *, bold: bool = False) -> str:
@@ -166,8 +165,7 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
     """Return what a label says: name, size, how to cut the piece, cloth, included allowances, garment."""
     lines = [piece.printed_name.upper()]
     if piece.size:
-        words = printed_size(piece.size)
-        lines.append(words[0].upper() + words[1:])
+        lines.append(as_sentence(printed_size(piece.size)))
     lines.append(cutting_words(piece) + (f" - {piece.fabric}" if piece.fabric else ""))
     lines += [
         f"{cutting_words(replace(piece, quantity=count, also={}))} - {cloth}" for cloth, count in piece.also.items()

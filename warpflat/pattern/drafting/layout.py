@@ -12,7 +12,7 @@ from warpflat.pattern.drafting.draft import nest_label
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.polygons import mapped
 
-__all__ = ["Placed", "Sheet", "lay_out", "nests", "occupied_points"]
+__all__ = ["Placed", "Sheet", "covered_rings", "lay_out", "nests"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -69,10 +69,10 @@ def nests(garment: DraftedGarment, sizes: Sequence[str] | None = None) -> list[t
     return [row for row in chosen if row]
 
 
-def occupied_points(group: Sequence[DraftedPiece]) -> FloatArray:
-    """Return the cut lines of pieces that lie upon each other, and the corners of a label beside them (#P by 2 [m])."""
+def covered_rings(group: Sequence[DraftedPiece]) -> list[FloatArray]:
+    """Return what pieces that lie upon each other cover: their cut lines, and the box of a label beside them (#P by 2 [m] each)."""
     label = nest_label(group)
-    return np.concatenate([*(piece.cut_line for piece in group), *([] if label.leader is None else [label.box])])
+    return [*(piece.cut_line for piece in group), *([] if label.leader is None else [label.box])]
 
 
 def lay_out(
@@ -94,7 +94,7 @@ def lay_out(
     """
     boxes = []
     for group in groups:
-        points = occupied_points(group)
+        points = np.concatenate(covered_rings(group))
         boxes.append((points.min(axis=0), points.max(axis=0)))
     extents = [high - low for low, high in boxes] + ([np.array(reserved)] if reserved is not None else [])
     # Boxes by falling height, each in the first row with room: (box, left edge).

@@ -16,7 +16,7 @@ from warpflat.pattern.drafting.label import Label, printed_size
 from warpflat.pattern.drafting.matched_lay import Stripes
 from warpflat.pattern.drafting.pieces import unknown_size
 from warpflat.pattern.drafting.placement import fit_label
-from warpflat.pattern.drafting.polygons import mapped, mirror_image, rotation
+from warpflat.pattern.drafting.polygons import mapped, mirror_image, outer_ring, rotation
 from warpflat.pattern.drafting.tile_nesting import CELL, nest_on_strip
 from warpflat.pattern.drafting.words import printed_in, translate
 
@@ -248,7 +248,7 @@ def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seco
             simple = exact.buffer(SIMPLER / 2, join_style="mitre", mitre_limit=2).simplify(SIMPLER / 2)
         fewer = 2 * shapely.get_num_coordinates(simple) < shapely.get_num_coordinates(exact)
         simple = simple if fewer and simple.contains(exact) else exact
-        corners = np.asarray(shapely.orient_polygons(shapely.Polygon(simple.exterior)).exterior.coords)[:-1]
+        corners = outer_ring(simple)
         items.append(spyrrow.Item(str(index), [(x * 1000, y * 1000) for x, y in corners.tolist()], 1, angles))
     instance = spyrrow.StripPackingInstance(name, usable * 1000, items)
     config = spyrrow.StripPackingConfig(
@@ -295,7 +295,7 @@ def unfold_piece(piece: DraftedPiece) -> FloatArray:
         # Both halves end on the fold within rounding; a tiny overlap joins them.
         joined = shapely.union_all([half.buffer(2e-6, join_style="mitre") for half in (whole, mirror)])
         whole = max(shapely.get_parts(joined.buffer(-2e-6, join_style="mitre")), key=lambda part: part.area)
-    return np.asarray(shapely.orient_polygons(shapely.Polygon(whole.exterior)).exterior.coords)[:-1]
+    return outer_ring(whole)
 
 
 def _copies(garment: DraftedGarment, fabric: str, sizes: Mapping[str, int]) -> list[tuple[DraftedPiece, bool]]:

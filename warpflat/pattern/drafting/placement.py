@@ -18,7 +18,7 @@ from warpflat.core import FloatArray, points_at_lengths, polyline_length, unit
 from warpflat.pattern.drafting.drafted import DraftedPiece
 from warpflat.pattern.drafting.label import LEADING, TEXT, TITLE, Label, box_around, label_lines, text_width, wrap_text
 from warpflat.pattern.drafting.polygons import rotation
-from warpflat.pattern.drafting.words import translate
+from warpflat.pattern.drafting.words import as_sentence, translate
 
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon
@@ -397,8 +397,7 @@ def _wrapped_labels(lines: tuple[tuple[str, float], ...]) -> Iterator[tuple[Labe
     """Yield labels of full size around the origin, wrapped more and more, each with a penalty for reading it."""
     seen = set()
     # The size stays in one row: a nest replaces it by all sizes.
-    size = translate("size {size}", size="")
-    size = size[0].upper() + size[1:]
+    size = as_sentence(translate("size {size}", size=""))
     smallest = min(height for _, height in lines)
     for heights, penalty in (([h for _, h in lines], 1.0), ([smallest for _ in lines], SMALL_TITLE)):
         plain = [(text, height) for (text, _), height in zip(lines, heights, strict=True)]

@@ -24,6 +24,7 @@ __all__ = [
     "mapped",
     "mirror_image",
     "normal_towards",
+    "outer_ring",
     "parallelogram",
     "polygons_only",
     "reflect",
@@ -31,7 +32,6 @@ __all__ = [
     "signed_area",
     "turn_between",
     "union",
-    "unit_vector",
     "upright",
 ]
 
@@ -114,7 +114,7 @@ def reflect(area: Geometry, point: FloatArray, direction: FloatArray) -> Geometr
 
 def mirror_image(points: FloatArray, line: FloatArray) -> FloatArray:
     """Return points (#P by 2 [m]) mirrored at the straight line from the first to the last point of a line (#L by 2 [m])."""
-    x, y = unit_vector(line[-1] - line[0])
+    x, y = unit(line[-1] - line[0])
     normal = np.array([-y, x])
     return reflected(points, normal, float(normal @ line[0]))
 
@@ -126,9 +126,17 @@ def mapped(points: FloatArray, matrix: FloatArray) -> FloatArray:
 
 def half_plane(start: FloatArray, end: FloatArray, reach: float) -> Polygon:
     """Return the half of the plane to the left of the line from one point to another, as far as `reach` [m]."""
-    direction = unit_vector(end - start)
+    direction = unit(end - start)
     left = np.array([-direction[1], direction[0]])
     return parallelogram(start, direction, (-reach, reach), left, (0.0, reach))
+
+
+def outer_ring(area: Geometry) -> FloatArray:
+    """Return the outer ring of the largest part of an area, counter-clockwise, #P by 2 [m]; the first point is not repeated."""
+    import shapely
+
+    largest = max(shapely.get_parts(area), key=lambda part: part.area)
+    return np.asarray(shapely.orient_polygons(shapely.Polygon(largest.exterior)).exterior.coords)[:-1]
 
 
 def signed_area(ring: FloatArray) -> float:
@@ -163,9 +171,3 @@ def upright(direction: FloatArray) -> FloatArray:
     """Return the 2 by 2 matrix that turns a direction upwards."""
     x, y = unit(direction)
     return np.array([[y, -x], [x, y]])
-
-
-def unit_vector(vector: FloatArray) -> FloatArray:
-    """Return the vector at length 1; (1, 0) stands for one without length."""
-    length = float(np.linalg.norm(vector))
-    return vector / length if length > 1e-12 else np.array([1.0, 0.0])

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray
-from warpflat.pattern.drafting.polygons import GRID, difference, turn_between, union, unit_vector
+from warpflat.core import FloatArray, unit
+from warpflat.pattern.drafting.polygons import GRID, difference, turn_between, union
 
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon
@@ -64,7 +64,7 @@ class Wedge:
     @property
     def middle(self) -> FloatArray:
         """Unit vector from the tip along the line on which the wedge is folded."""
-        return unit_vector(unit_vector(self.left[0] - self.tip) + unit_vector(self.right[-1] - self.tip))
+        return unit(unit(self.left[0] - self.tip) + unit(self.right[-1] - self.tip))
 
     @property
     def opening(self) -> float:

@@ -14,7 +14,7 @@ from importlib import resources
 
 from warpflat.core import read_toml
 
-__all__ = ["language_words", "letters_of", "listed", "printed_in", "translate", "translate_name"]
+__all__ = ["as_sentence", "language_words", "letters_of", "listed", "printed_in", "translate", "translate_name"]
 
 _EMPTY: Mapping[str, str] = {}
 _table: ContextVar[Mapping[str, str]] = ContextVar("words", default=_EMPTY)
@@ -47,6 +47,11 @@ def translate(phrase: str, **values: object) -> str:
     except (LookupError, ValueError):
         # A translation with other places in braces than the phrase has.
         return phrase.format(**values)
+
+
+def as_sentence(words: str) -> str:
+    """Return words with a capital at their beginning."""
+    return words[0].upper() + words[1:]
 
 
 def translate_name(name: str) -> str:

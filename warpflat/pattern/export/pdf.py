@@ -22,7 +22,7 @@ from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.drawing import Drawing, OnPaper, Stroke, draw_nest
 from warpflat.pattern.drafting.half_pieces import halved
 from warpflat.pattern.drafting.label import BOLD, CAPITALS, FONT, embedded_font, text_width
-from warpflat.pattern.drafting.layout import Placed, Sheet, lay_out, nests, occupied_points
+from warpflat.pattern.drafting.layout import Placed, Sheet, covered_rings, lay_out, nests
 from warpflat.pattern.drafting.polygons import mapped, upright
 from warpflat.pattern.drafting.sewing_order import seam_letters
 from warpflat.pattern.drafting.tile_nesting import nest_on_tiles
@@ -142,7 +142,8 @@ def _beside_on_one_sheet(place: Placed, others: Sequence[Placed], tiling: Tiling
 
     windows = [tiling.window(tile) for tile in tiling.tiles]
     taken = [shapely.Polygon(place.on_sheet(piece.cut_line)) for piece in place.pieces]
-    taken += [shapely.convex_hull(shapely.MultiPoint(each.on_sheet(occupied_points(each.pieces)))) for each in others]
+    around = [each.on_sheet(np.concatenate(covered_rings(each.pieces))) for each in others]
+    taken += [shapely.convex_hull(shapely.MultiPoint(points)) for points in around]
     cloth, label = shapely.union_all(taken), nest_label(place.pieces)
     steps = np.arange(-_REACH, _REACH + 1e-9, _STEP)
     shifts = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
@@ -363,13 +364,10 @@ def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[She
         # Pieces, turned where that helps, on the tiles of a grid, of which they take few.
         shapes = []
         for group in groups:
-            label = nest_label(group)
-            parts = [shapely.Polygon(piece.cut_line) for piece in group]
+            rings = covered_rings(group)
+            shape = shapely.union_all([shapely.Polygon(ring) for ring in rings])
             # A label beside its piece belongs to it, with all between.
-            shape = shapely.union_all(parts)
-            if label.leader is not None:
-                shape = shapely.union_all([*parts, shapely.Polygon(label.box)]).convex_hull
-            shapes.append(shape)
+            shapes.append(shape if len(rings) == len(group) else shape.convex_hull)
         places, size = nest_on_tiles(shapes, step=paper.step, overlap=paper.overlap, gap=0.004)
         placed = []
         for group, shape, place in zip(groups, shapes, places, strict=True):
@@ -380,7 +378,7 @@ def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[She
         sheet = Sheet(placed=tuple(placed), size=size)
         return sheet, make_tiling(sheet, paper)
     if paper.endless:
-        widest = max(float(np.ptp(occupied_points(group)[:, 0])) for group in groups)
+        widest = max(float(np.ptp(np.concatenate(covered_rings(group))[:, 0])) for group in groups)
         sheet = lay_out(groups, width=max(PROJECTED_WIDTH, widest + 0.05), gap=0.016, reserved=LEGEND_SIZE)
         width, height = sheet.size + 2 * paper.margin + paper.overlap
         paper = replace(paper, width=float(width), height=float(height))
@@ -404,19 +402,17 @@ def _on_pages(groups: Sequence[tuple[DraftedPiece, ...]], paper: Paper) -> Sheet
     gap, step = 0.012, paper.step
     turns, boxes, shapes = [], [], []
     for group in groups:
-        points = occupied_points(group)
+        rings = covered_rings(group)
+        points = np.concatenate(rings)
         around = shapely.MultiPoint(points).minimum_rotated_rectangle
         turn = np.eye(2)
         if around.geom_type == "Polygon" and float(np.prod(np.ptp(points, axis=0))) > SLANTING * around.area:
             sides = np.diff(np.asarray(around.exterior.coords), axis=0)[:2]
             along = max(sides, key=lambda side: float(np.linalg.norm(side)))
             turn = upright(along if along[1] >= 0 else -along)
-        lines = [piece.cut_line @ turn.T for piece in group]
-        label = nest_label(group)
-        lines += [] if label.leader is None else [label.box @ turn.T]
         turns.append(turn)
-        boxes.append(np.stack([np.concatenate(lines).min(axis=0), np.concatenate(lines).max(axis=0)]))
-        shapes.append(shapely.union_all([shapely.Polygon(line) for line in lines]))
+        boxes.append(np.stack([(points @ turn.T).min(axis=0), (points @ turn.T).max(axis=0)]))
+        shapes.append(shapely.union_all([shapely.Polygon(ring @ turn.T) for ring in rings]))
     legend = len(groups)
     boxes.append(np.array([(0.0, 0.0), LEGEND_SIZE]))
     shapes.append(shapely.box(0.0, 0.0, *LEGEND_SIZE))

@@ -15,7 +15,7 @@ from warpflat.pattern.drafting.layout import Sheet
 from warpflat.pattern.drafting.measures import INCH
 from warpflat.pattern.drafting.placement import fit_label
 from warpflat.pattern.drafting.sewing_tasks import piece_titles
-from warpflat.pattern.drafting.words import translate
+from warpflat.pattern.drafting.words import as_sentence, translate
 from warpflat.pattern.export.pdf_pen import POINT, draw_line, draw_words, page_footer, write
 from warpflat.pattern.export.pdf_tiling import LEGEND_SIZE, SIZE_DASHES
 from warpflat.pattern.export.svg import SIZE_COLOURS, STYLE
@@ -51,7 +51,7 @@ def draw_legend(canvas: Any, at: FloatArray, garment: DraftedGarment, sizes: Seq
     _text(canvas, x, top - 0.008, garment.name.replace("_", " "), 18, bold=True)
     if any(sizes):
         words = printed_size(sizes[0]) if len(sizes) == 1 else translate("sizes {sizes}", sizes=", ".join(sizes))
-        _text(canvas, x, top - 0.016, words[0].upper() + words[1:], 11)
+        _text(canvas, x, top - 0.016, as_sentence(words), 11)
     _text(canvas, x, top - 0.025, translate("Print at 100 % (actual size). Do not fit to the page."), 10, bold=True)
     _text(
         canvas,

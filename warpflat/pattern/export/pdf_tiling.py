@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.core import FloatArray
-from warpflat.pattern.drafting.draft import nest_label
-from warpflat.pattern.drafting.layout import Sheet
+from warpflat.pattern.drafting.layout import Sheet, covered_rings
 from warpflat.pattern.drafting.words import letters_of
 
 if TYPE_CHECKING:
@@ -130,9 +129,9 @@ def make_tiling(sheet: Sheet, paper: Paper) -> Tiling:
     rows = max(1, int(np.ceil((sheet.size[1] - paper.overlap) / step[1] - 1e-9)))
     tiling = Tiling(paper=paper, rows=rows, columns=columns, tiles=(), sheet=sheet)
     # What is drawn: pieces, labels beside them, the reserved block.
-    shapes = [shapely.Polygon(placed.on_sheet(piece.cut_line)) for placed in sheet.placed for piece in placed.pieces]
-    labels = [(nest_label(placed.pieces), placed) for placed in sheet.placed]
-    shapes += [shapely.Polygon(placed.on_sheet(label.box)) for label, placed in labels if label.leader is not None]
+    shapes = [
+        shapely.Polygon(placed.on_sheet(ring)) for placed in sheet.placed for ring in covered_rings(placed.pieces)
+    ]
     if sheet.reserved is not None:
         shapes.append(shapely.box(*sheet.reserved, *(sheet.reserved + LEGEND_SIZE)))
     # The tiles on which a part of a shape lies that no other tile shows.

@@ -41,7 +41,7 @@ _ROOM = PAGE_WIDTH - 2 * MARGIN
 _NARROWEST_PAGE = 8.8
 # A piece: room for names beside, below and above its views, for the heading of a view, and for a line of its captions.
 _BESIDE, _FOOT, _NAMED, _HEADING, _LINE = 0.2, 0.22, 0.18, 0.4, 0.15
-_BETWEEN, _CAPTION_SIZE, _TITLE_SIZE = "  ·  ", 7.5, 10.5
+_BETWEEN, _TITLE_SIZE = "  ·  ", 10.5
 _LONGEST_NAME = 5.4  # two of them have room side by side
 _SMALLEST_PATTERN, _NARROWEST = 2.0, 1.6
 _STACKED = 2.6  # width of two views side by side over their height, from which they stand one below the other
@@ -171,7 +171,7 @@ def _draw(
     shared = ""
     for key, value in list(cells[0].captions.items()) if len(cells) > 1 else ():
         caption = f"{key} {value}"
-        fits = pen.measure(caption, _CAPTION_SIZE)[0] < _SCALE_BAR - 0.1
+        fits = pen.measure(caption, LABEL_SIZE)[0] < _SCALE_BAR - 0.1
         if fits and all(cell.captions.get(key) == value for cell in cells):
             for cell in cells:
                 del cell.captions[key]
@@ -182,7 +182,7 @@ def _draw(
     rows = _DraftedRows(pen, drafted, width - 2 * MARGIN, page_scale) if drafted else None
     pen.resize(width, height + _STRIP + (0.0 if rows is None else rows.height))
     pen.scale_bar(MARGIN, pen.height - 0.27, page_scale)
-    pen.write(MARGIN, pen.height - 0.48, shared, _CAPTION_SIZE, color=GREY)
+    pen.write(MARGIN, pen.height - 0.48, shared, LABEL_SIZE, color=GREY)
     _draw_colours(pen, scale, density, areas, quantity)
     top = pen.height - _STRIP
     if band is not None:
@@ -213,7 +213,7 @@ def _draw_colours(pen: Pen, scale: Scale, density: FloatArray, areas: FloatArray
         share = float(areas[above].sum()) / total
         percent = f"{100 * share:.1f} %" if share >= 0.001 else "under 0.1 %"
         text = f"clipped: {percent} of the area\nis above, up to {density.max():.3g} J/m²"
-        pen.write(right + 0.12, top, text, _CAPTION_SIZE, color=GREY, linespacing=1.35)
+        pen.write(right + 0.12, top, text, LABEL_SIZE, color=GREY, linespacing=1.35)
 
 
 @dataclass(kw_only=True, eq=False)
@@ -282,9 +282,9 @@ class _Cell:
         factor, word = (100, "cm") if max(width, height) >= 0.00999 else (1000, "mm")
         self.caption_lines, room = list[str](), 0.0
         for key, value in {"pattern": f"{factor * width:.1f} × {factor * height:.1f} {word}", **self.captions}.items():
-            entry = pen.shorten(f"{key} {value}", _CAPTION_SIZE, self.width - 0.1)
-            taken = pen.measure(entry, _CAPTION_SIZE)[0]
-            gap = pen.measure(_BETWEEN, _CAPTION_SIZE)[0]
+            entry = pen.shorten(f"{key} {value}", LABEL_SIZE, self.width - 0.1)
+            taken = pen.measure(entry, LABEL_SIZE)[0]
+            gap = pen.measure(_BETWEEN, LABEL_SIZE)[0]
             if self.caption_lines and gap + taken < room:
                 self.caption_lines[-1] += _BETWEEN + entry
                 room -= gap + taken
@@ -420,7 +420,7 @@ def _draw_cell(pen: Pen, cell: _Cell, top: float, page_scale: float) -> None:
     top -= cell.top
     pen.write(cell.left, top - 0.13, cell.name, _TITLE_SIZE, fontweight="bold")
     for index, text in enumerate(cell.caption_lines):
-        pen.write(cell.left, top - 0.32 - _LINE * index, text, _CAPTION_SIZE, color=GREY)
+        pen.write(cell.left, top - 0.32 - _LINE * index, text, LABEL_SIZE, color=GREY)
     size, shown, bottom = cell.inches_per_metre, list[DrawnView](), top - cell.head
     for row in cell.rows:
         sizes = size * np.array([view.size[:2] for view in row.values()])

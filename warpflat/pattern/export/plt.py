@@ -25,8 +25,6 @@ PENS = {"cut": 1, "cutout": 1, "notch": 2, "drill": 2}
 _MARKS = 3
 # Width of the device's letters over their height: a letter takes 1.5 of its width, which is what those of other files take.
 _WIDE = 0.55
-# Ends a text.
-_ETX = "\x03"
 
 
 def write_plt(
@@ -62,8 +60,9 @@ def write_plt(
                 x, y = np.rint(UNITS_IN_METRE * placed.on_sheet(words.at[None])[0]).astype(np.int64).tolist()
                 letters = "".join(each if 32 <= ord(each) < 127 else "?" for each in plain_letters(words.text))
                 high, turn = 100.0 * words.height, f"DI{np.cos(words.angle):.4f},{np.sin(words.angle):.4f};"
+                # The character ETX ends a text.
                 size = f"SI{_WIDE * high:.3f},{high:.3f};"
-                written[_MARKS].append(f"PU{x},{y};LO5;{turn}{size}LB{letters}{_ETX};")
+                written[_MARKS].append(f"PU{x},{y};LO5;{turn}{size}LB{letters}\x03;")
     rows = ["IN;"]
     for pen, lines in written.items():
         rows += [f"SP{pen};", *lines] if lines else []

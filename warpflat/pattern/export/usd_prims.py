@@ -49,7 +49,6 @@ __all__ = [
 FIRST_FRAME = 1
 # Frames of a film in a second.
 _RATE = 24.0
-_CONSTANT = "constant"
 
 
 @contextmanager
@@ -340,9 +339,9 @@ class _Line:
         self._curves.CreateTypeAttr(UsdGeom.Tokens.linear)
         self._curves.CreateWrapAttr(UsdGeom.Tokens.nonperiodic)
         self._curves.CreateWidthsAttr(Vt.FloatArray([width]))
-        self._curves.SetWidthsInterpolation(_CONSTANT)
+        self._curves.SetWidthsInterpolation(UsdGeom.Tokens.constant)
         colours = Vt.Vec3fArray([Gf.Vec3f(*(float(channel) for channel in colour))])
-        self._curves.CreateDisplayColorPrimvar(_CONSTANT).Set(colours)
+        self._curves.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set(colours)
         self._stored = 0
         self._shown = False
         self._points: Any = None
