@@ -27,6 +27,7 @@ from warpflat.garment.construction.finishing import with_plackets
 from warpflat.garment.construction.fullness import give_fullness
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.girths import girth_constraints, loose_armholes, pattern_girths
+from warpflat.garment.construction.mirror import match_images
 from warpflat.garment.construction.openings import opened_rings
 from warpflat.garment.construction.rings import GarmentRing, measure_rings
 from warpflat.garment.construction.sewing import sew
@@ -54,6 +55,13 @@ class FormGarment(Garment):
     form: FormResult
     wished: SeamRatios | None = None
     curves: Curves | None = None
+
+    @cached_property
+    def images(self) -> dict[str, tuple[str, IntArray]]:
+        """By piece its mirror image, as the grid tells it: a body's two sides lie only nearly alike."""
+        grid = np.concatenate([piece.grid_vertices for piece in self.form.pieces.values()])
+        surfaces = {name: piece.surface for name, piece in self.form.pieces.items()}
+        return match_images(surfaces, grid, self.mannequin.layout.mirror[grid])
 
     @property
     def notes(self) -> tuple[str, ...]:
