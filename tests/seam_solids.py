@@ -124,7 +124,7 @@ def skin(
         near = np.linalg.norm(cloth.vertices[cloth.faces].mean(axis=1) - point, axis=1) < _REACH * (
             2.0 if wide else 1.0
         )
-        cloth, beyond = cloth.split("plane", near)
+        cloth, beyond, _ = cloth.split("plane", near)
         near = np.linalg.norm(cloth.vertices[cloth.faces].mean(axis=1) - point, axis=1) < _REACH * (
             2.0 if wide else 1.0
         )

@@ -9,6 +9,8 @@ from .cutting.cut_plan import CutPlan as CutPlan
 from .cutting.cut_plan import draw_line as draw_line
 from .cutting.cut_plan import line_part as line_part
 from .cutting.dart_move import move_dart as move_dart
+from .cutting.ledger import LEAST_MOUTH as LEAST_MOUTH
+from .cutting.ledger import TRIED as TRIED
 from .cutting.ledger import AutoCut as AutoCut
 from .cutting.ledger import Ledger as Ledger
 from .cutting.ledger import LedgerEntry as LedgerEntry

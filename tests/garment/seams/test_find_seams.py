@@ -16,7 +16,6 @@ from warpflat.flat.surface.connectivity import border_loops, euler_characteristi
 from warpflat.flat.surface.mesh import Surface
 from warpflat.garment.construction.sew_pieces import meeting_borders, unsewn_borders
 from warpflat.garment.seams.anatomy import averaged_limbs, find_anatomy
-from warpflat.garment.seams.fields import Operators
 from warpflat.garment.seams.find import FoundSeams, cloth_of
 from warpflat.garment.seams.thickness import even_line
 
@@ -60,7 +59,7 @@ def without(surface: Surface, *beyond: Callable[[np.ndarray], np.ndarray]) -> Su
     """A surface without what lies where fields of places are positive."""
     cloth = cloth_of(surface)
     for field in beyond:
-        cloth, outside = replace(cloth, values={"beyond": field(cloth.vertices)}).split(
+        cloth, outside, _ = replace(cloth, values={"beyond": field(cloth.vertices)}).split(
             "beyond", np.ones(len(cloth.faces), dtype=bool)
         )
         cloth = replace(cloth, faces=cloth.faces[~outside], values={})
@@ -148,7 +147,7 @@ def test_the_sleeves_of_a_waisted_shirt_begin_at_its_armpits_not_at_its_waist() 
     narrower = np.where(height < 0.4, 1.0 - 0.5 * np.exp(-(((height - 0.15) / 0.12) ** 2)), 1.0)
     waisted = warpflat.make_surface(plain.vertices * np.stack([narrower, 0 * narrower + 1, narrower], 1), plain.faces)
     cloth = cloth_of(waisted)
-    anatomy = find_anatomy(cloth, Operators(vertices=cloth.vertices, faces=cloth.faces))
+    anatomy = find_anatomy(cloth)
     assert [limb.kind for limb in anatomy.limbs] == ["sleeve", "sleeve"]
     assert [limb.fork[1] for limb in anatomy.limbs] == pytest.approx([0.415, 0.415], abs=0.02)
 
@@ -315,7 +314,7 @@ def test_an_armhole_turns_forwards_with_a_raised_sleeve() -> None:
 
 def test_limbs_of_a_garment_of_equal_sides_are_mirror_images() -> None:
     cloth = cloth_of(solids.shirt(0.4))
-    anatomy = find_anatomy(cloth, Operators(vertices=cloth.vertices, faces=cloth.faces))
+    anatomy = find_anatomy(cloth)
     left, right = sorted(anatomy.limbs, key=lambda limb: -limb.side)
     off = replace(left, along=np.array([0.6, 0.0, 0.8]), fork=left.fork + np.array([0.0, 0.3, 0.0]))
     anatomy = replace(anatomy, limbs=(off, right))

@@ -11,7 +11,6 @@ import seam_solids as solids
 import warpflat
 from warpflat.flat.surface.mesh import Surface
 from warpflat.garment.seams.anatomy import Anatomy, axis_name, describe, find_anatomy
-from warpflat.garment.seams.fields import Operators
 from warpflat.garment.seams.find import cloth_of
 
 
@@ -118,7 +117,7 @@ def ball_of_any_holes() -> Surface:
 
 def anatomy_of(surface: Surface) -> Anatomy:
     cloth = cloth_of(surface)
-    return find_anatomy(cloth, Operators(vertices=cloth.vertices, faces=cloth.faces))
+    return find_anatomy(cloth)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +18,9 @@ from warpflat.flat.surface.connectivity import border_loops, euler_characteristi
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.tubes import tube_borders
 from warpflat.garment.construction.to_pattern import pattern_of_garment
-from warpflat.garment.seams.cloth import Cloth, PieceMesh
+from warpflat.garment.seams.cloth import Cloth
 from warpflat.garment.seams.energy import _TRIAL, _can_be_sewn, _cut
-from warpflat.garment.seams.fields import Operators
+from warpflat.garment.seams.fields import TriangleMesh
 from warpflat.garment.seams.find import FoundSeams, cloth_of
 from warpflat.garment.seams.lines import Line
 from warpflat.garment.seams.measure import Measured, laid_flat
@@ -221,16 +220,12 @@ def test_a_neck_that_is_too_narrow_to_be_sewn_is_cut_through(columns: int) -> No
     cloth = cloth_of(bone(columns))
     fabric = as_fabric("woven")
     parted, _ = part_solids(
-        cloth, shape=True, measure=lambda trial, mesh, width: laid_flat(as_surface(trial, mesh), fabric, width)
+        cloth, shape=True, measure=lambda trial, mesh, width: laid_flat(mesh.as_surface(), fabric, width)
     )
     areas = [float(parted.face_areas[mesh.face_of].sum()) for mesh in parted.pieces()]
     assert len(areas) == (2 if columns == 2 else 1)
     if columns == 2:
         assert parted.seam_length("seam 1") == pytest.approx(0.004, rel=0.1)
-
-
-def as_surface(cloth: Cloth, mesh: PieceMesh) -> Surface:
-    return replace(cloth, vertices=mesh.vertices, faces=mesh.faces, values={}, labels={}, seams={}).as_surface()
 
 
 def dented(depth: float = 0.08) -> Surface:
@@ -289,11 +284,9 @@ def test_a_dart_that_all_but_parts_a_piece_is_not_made(leaves: float, fits: bool
 def laid_on_trial(cloth: Cloth) -> Measured:
     """Return the only piece of a cloth, laid flat."""
     (mesh,) = cloth.pieces()
-    surface = as_surface(cloth, mesh)
+    surface = mesh.as_surface()
     result = warpflat.flatten(surface, fabric="woven")
-    return Measured(
-        mesh=mesh, surface=surface, result=result, outside=0.0, energy=0.0, area=1.0, place=mesh.vertices.mean(axis=0)
-    )
+    return Measured(mesh=mesh, surface=surface, result=result, outside=0.0, energy=0.0, area=1.0)
 
 
 def test_who_asks_for_less_beyond_the_limit_gets_darts_that_bring_less() -> None:
@@ -332,7 +325,7 @@ def test_trousers_as_tight_as_a_skin_have_darts_and_no_panel_more() -> None:
     plain = solids.trousers(0.04)
     vertices = plain.vertices.copy()
     faces = plain.faces[:, :3].astype(np.int64)
-    normals = Operators(vertices=vertices, faces=faces).vertex_normals
+    normals = TriangleMesh(vertices=vertices, faces=faces).vertex_normals
     for side in (1, -1):
         for place in ([0.07 * side, 0.1, -0.14], [0.12 * side, -0.28, 0.07], [0.13 * side, -0.4, -0.08]):
             away = np.linalg.norm(plain.vertices - place, axis=1)

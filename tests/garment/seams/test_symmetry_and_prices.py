@@ -16,7 +16,6 @@ from warpflat.app.scene.found_seams import found_seams
 from warpflat.flat.surface.mesh import Surface
 from warpflat.garment.construction.mirror import mirror_images
 from warpflat.garment.seams.anatomy import find_anatomy
-from warpflat.garment.seams.fields import Operators
 from warpflat.garment.seams.find import FoundSeams, cloth_of
 from warpflat.garment.seams.symmetric import mirrored
 
@@ -65,7 +64,7 @@ def test_wrinkles_that_cross_the_middle_to_and_fro_leave_both_sides_alike() -> N
 
 def test_a_seam_on_one_side_alone_keeps_the_sides_apart() -> None:
     cloth = cloth_of(solids.skirt())
-    anatomy = find_anatomy(cloth, Operators(vertices=cloth.vertices, faces=cloth.faces))
+    anatomy = find_anatomy(cloth)
     cloth = cloth.with_seam("pocket left", cloth.half_edges.edges[:1].astype(np.int64))
     kept, why = mirrored(cloth, anatomy)
     assert kept is cloth

@@ -129,7 +129,7 @@ def find_candidates(result: Flattening, places: Sequence[int] | None = None) -> 
         # Two cuts that mirror each other are as long and have ends at equal distances across.
         (begin, tip), (other_begin, other_tip) = (result.surface.vertices[one.paths[0][[0, -1]]] for one in (a, b))
         across = np.linalg.norm(begin - other_tip) - np.linalg.norm(tip - other_begin)
-        lengths = [_cut_length(result.surface, one) for one in (a, b)]
+        lengths = [sum(path.length for path in one.drawn) or path_length(result.surface, one.paths) for one in (a, b)]
         alike = abs(lengths[0] - lengths[1]) <= _ALIKE * max(lengths) and abs(across) <= _ALIKE * size
         if not alike or np.isin(row, other).any():
             continue
@@ -253,7 +253,7 @@ def _straight(
         # Sheared quads give way along their diagonals, which a crack in the membrane does not know: of theirs the shortest.
         yield from sorted(around, key=lambda one: one[0].price.length if quads else -one[0].price.per_metre)[:1]
     rim = np.flatnonzero(laid.border & np.isin(result.vertex_origin, border_edges(surface.faces)))
-    start = int(rim[np.linalg.norm(flat[rim] - flat[place], axis=1).argmin()])
+    start = laid.nearest(rim, flat[place])
     made = (path for one in result.cuts for path in one.paths)
     if np.linalg.norm(flat[start] - flat[place]) > _REACH * size or any(
         _distance(surface, path, int(result.vertex_origin[start])) < _REACH * size for path in made
@@ -264,8 +264,7 @@ def _straight(
     inner = np.flatnonzero(~laid.border)
     middle = inner[distance_from(surface, np.unique(border_edges(surface.faces)))[result.vertex_origin[inner]].argmax()]
     for kind, share in _INWARDS.items():
-        aim = (1.0 - share) * flat[start] + share * flat[middle]
-        tip = int(inner[np.linalg.norm(flat[inner] - aim, axis=1).argmin()])
+        tip = laid.nearest(inner, (1.0 - share) * flat[start] + share * flat[middle])
         yield from priced(f"{kind} {_last_number(result, 'inward') + number + 1}", laid.dart(start, tip))
 
 
@@ -273,7 +272,3 @@ def _last_number(result: Flattening, kind: str) -> int:
     """Return the highest number in the names of lines and cuts of a kind; 0 if there is none."""
     names = " ".join([*result.surface.lines, *(made.name for made in result.cuts)])
     return max((int(found) for found in re.findall(rf"\b{kind} (\d+)", names)), default=0)
-
-
-def _cut_length(surface: Surface, one: Candidate) -> float:
-    return sum(path.length for path in one.drawn) or path_length(surface, one.paths)

@@ -22,8 +22,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import dijkstra
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import arc_lengths
@@ -33,6 +31,7 @@ from warpflat.flat.model.strain import area_beyond, corner_strain, worn_cell_str
 from warpflat.flat.solver.metric import StiffnessFactor, cell_forces, cell_stiffness
 from warpflat.flat.surface.connectivity import border_of, join_labels
 from warpflat.flat.surface.half_edges import half_edges_of, opposite_half_edges
+from warpflat.flat.surface.paths.edge_paths import EdgeGraph
 
 __all__ = ["ElasticCrack", "LaidCloth", "Parted", "Price"]
 
@@ -143,6 +142,10 @@ class LaidCloth:
         strain = self._strain + (ahead - back) / (2.0 * _STEP)
         return area_beyond(self.network.fabric, strain, self._area)
 
+    def nearest(self, among: Ids, place: FloatArray) -> int:
+        """Return which of some vertices lies nearest to a place in the layout (2 [m])."""
+        return int(among[np.linalg.norm(self.positions[among] - place, axis=1).argmin()])
+
     def row(self, start: int, end: int, off: FloatArray) -> Ids | None:
         """Return the vertices of a path along edges near to a line that does not touch a border on its way; None if there is none.
 
@@ -156,14 +159,8 @@ class LaidCloth:
         rim = self.border.copy()
         rim[[start, end]] = False
         cost = np.where(rim[edges].any(axis=1) | (self.half_edges.count < 2), _AT_BORDER * (cost + long.mean()), cost)
-        graph = coo_array((cost, edges.T), shape=(len(off), len(off))).tocsr()
-        _, before = dijkstra(graph, directed=False, indices=start, return_predecessors=True)
-        found = [end]
-        while found[-1] != start:
-            if before[found[-1]] < 0:
-                return None
-            found.append(int(before[found[-1]]))
-        return None if rim[found].any() else np.array(found[::-1])
+        found = EdgeGraph(self.network.surface).path(start, end, cost).astype(np.int64)
+        return None if len(found) == 0 or rim[found].any() else found
 
     def row_of(self, origin: IntArray, path: IntArray) -> Ids | None:
         """Return a path as vertices of the layout, in which cuts have doubled some; None if it touches the border on its way.

@@ -25,6 +25,8 @@ from warpflat.flat.solver.options import RelaxOptions, coarse_options
 from warpflat.flat.surface.cut.dart import dart_measure, fish_eye_measure
 
 __all__ = [
+    "LEAST_MOUTH",
+    "TRIED",
     "AutoCut",
     "Ledger",
     "LedgerEntry",
@@ -37,10 +39,12 @@ __all__ = [
 
 RankedBy = Literal["per_cm", "released"]
 
-# So many cuts are tried for a ledger, and so many for a choice.
-_LISTED, _TRIED = 8, 3
-# A dart that takes in less is not sewn but eased in [m].
-_LEAST_MOUTH = 5e-3
+# So many cuts are tried for a ledger.
+_LISTED = 8
+#: So many cuts, of those that promise most, are tried for a choice.
+TRIED = 3
+#: A dart that takes in less is not sewn but eased in [m].
+LEAST_MOUTH = 5e-3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -164,7 +168,7 @@ class LedgerEntry:
     @property
     def can_be_sewn(self) -> bool:
         """Whether it opens by 5 mm or more, and leaves no flipped face."""
-        return not self.flipped_faces and (self.mouth is None or self.mouth > _LEAST_MOUTH)
+        return not self.flipped_faces and (self.mouth is None or self.mouth > LEAST_MOUTH)
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data in SI units, but for `released_j_per_cm`."""
@@ -257,7 +261,7 @@ def best_of_few(
         by: what the order goes by: energy released per centimetre cut, or in all.
         listed: eight are tried, to be compared; else three, of which one is chosen.
     """
-    most = _LISTED if listed else _TRIED
+    most = _LISTED if listed else TRIED
 
     def promise(cost: Price) -> tuple[bool, float]:
         return not cost.opens, -(cost.per_metre if by == "per_cm" else cost.released)

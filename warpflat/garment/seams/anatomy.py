@@ -8,22 +8,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from warpflat.core import FloatArray, reflected
-from warpflat.flat import border_loops, components, euler_characteristic, mesh_edges
-from warpflat.garment.seams.cloth import Cloth, section
-from warpflat.garment.seams.fields import MirrorMap, Operators, mirror_map
+from warpflat.core import FloatArray, points_at_lengths, polyline_length, reflected, unit
+from warpflat.flat import components
+from warpflat.garment.seams.cloth import BESIDE_LINE, FACES, SAME_WAY, Cloth, section
+from warpflat.garment.seams.fields import MirrorMap, mirror_map
 
 __all__ = [
     "AXES",
+    "END",
+    "FROM_SHOULDERS",
     "HOLE",
+    "RING",
     "ROLES",
+    "TAILORED",
     "Anatomy",
     "Border",
     "Limb",
@@ -31,6 +35,7 @@ __all__ = [
     "axis_name",
     "describe",
     "find_anatomy",
+    "has_role",
 ]
 
 Ids = NDArray[np.int64]
@@ -38,6 +43,9 @@ Kind = Literal[
     "top", "dress", "skirt", "trousers", "jumpsuit", "sleeve", "hat", "glove", "sock", "band", "closed", "other"
 ]
 
+#: Kinds of garments that a tailor knows how to cut, and those of them that hang from the shoulders.
+TAILORED = ("top", "dress", "skirt", "trousers", "jumpsuit")
+FROM_SHOULDERS = ("top", "dress", "jumpsuit")
 #: Directions by name.
 AXES = {sign + letter: (1.0 if sign == "+" else -1.0) * np.eye(3)[k] for k, letter in enumerate("xyz") for sign in "+-"}
 
@@ -57,16 +65,14 @@ _OPEN = 0.6
 _SHORTEST_SLEEVE = 0.05
 # The way along sleeve and side bends at the armpit by at least this [cosine of the angle between both].
 _STRAIGHT = np.cos(np.radians(160.0))
-# Two limbs are the same, mirrored, if their directions are within this angle [cosine].
-_SAME_WAY = np.cos(np.radians(20.0))
 # Nothing that is worn around the trunk, and no head's opening, is narrower [m]; no sleeve is wider.
 _SLIMMEST = 0.55
 # What is narrower below its upper end by this share is no skirt; if it goes on below its waist by this [m], it is a dress.
 _WAISTED, _BELOW_WAIST = 0.93, 0.3
 # A waist is no longer than the cloth below it is wide by this; what goes on farther below an armhole, or a neck, than this is a dress [m].
 _WAVES, _LONG = 1.25, 0.8
-# Around a neck that is no longer [m], this upper share of a poncho lies level by this (mean cosine).
-_NECKS, _SHOULDERS, _LIES = 0.62, 0.35, 0.5
+# Around a neck that is no longer [m], this upper share of a poncho faces up in the mean.
+_NECKS, _SHOULDERS = 0.62, 0.35
 # The trunk of a newborn is so long, and so far around its widest opening [m]. What is shorter than the third ends at the thigh, where a
 # leg's girth is this share of the waist's.
 _LEAST_BODY, _TO_THE_THIGH, _THIGH = (0.12, 0.28), 0.3, 0.35
@@ -74,13 +80,15 @@ _LEAST_BODY, _TO_THE_THIGH, _THIGH = (0.12, 0.28), 0.3, 0.35
 _HEADS, _HANDS, _FLAT_HAND = (0.38, 0.75), (0.1, 0.45), 0.65
 # A hem slants if it spans this share of the height, and the cloth above it, at least the second share of all, tells left from right.
 _SLANT, _ENOUGH_ABOVE = 0.15, 0.2
-# A front opening's area vector is less than this of a ring's; a hem's lies along the height by this cosine; cloth that goes on from all its
+#: A border is a ring if its area vector is at least this of a circle's; an opening in front is none.
+RING = 0.6
+# Cloth that goes on from all its
 # hems as a tube widened by more than this is a ball's with holes (a top's hem or sleeve .9 to 1.12, a ball's from 1.2 on).
-_RING, _DOWN, _TUBE = 0.6, 0.5, 1.16
-# It is turned around if it can be worn better by this; an opening in front ends in such a share of the garment's height.
-_SURELY, _END = 0.25, 0.15
-# A garment lies on its back if the way through it is upright by this (cosine).
-_LIES_ON_BACK = 0.8
+_TUBE = 1.16
+# It is turned around if it can be worn better by this.
+_SURELY = 0.25
+#: An opening in front ends above and below in such a share of the garment's height.
+END = 0.15
 # A plane of symmetry holds if the mirror image of the cloth lies on the cloth within this (median).
 _SYMMETRIC = 0.02
 
@@ -92,7 +100,7 @@ class Border:
     Attributes:
         vertices: in their order.
         middle: [m], length: [m].
-        normal: the area vector of the loop over its length squared: how level it is, and which way it faces.
+        normal: the area vector of the loop over that of a circle as long: how level it is, and which way it faces.
         role: neck, waist, hem, sleeve, leg, opening, armhole, hole, or border.
         side: +1 on the garment's left, -1 on its right, 0 in the middle.
     """
@@ -101,8 +109,19 @@ class Border:
     middle: FloatArray
     length: float
     normal: FloatArray
-    role: str
+    role: str = "border"
     side: int = 0
+
+    @classmethod
+    def measured(cls, vertices: FloatArray, loop: Ids) -> Border:
+        """Return the border along a loop of vertices."""
+        points = vertices[loop]
+        following = np.roll(points, -1, axis=0)
+        steps = np.linalg.norm(following - points, axis=1)
+        length = float(steps.sum())
+        middle = ((points + following) * (0.5 * steps[:, None])).sum(axis=0) / max(length, 1e-300)
+        area = 0.5 * np.cross(points - middle, following - middle).sum(axis=0)
+        return cls(vertices=loop, middle=middle, length=length, normal=area * (4.0 * np.pi / max(length, 1e-300) ** 2))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -163,39 +182,43 @@ class Anatomy:
         """Return the mirror images of points (... by 3 [m])."""
         return reflected(points, self.normal, self.offset)
 
+    def across(self, points: FloatArray) -> FloatArray:
+        """Return how far points (... by 3 [m]) lie to the left of the plane of symmetry [m]."""
+        return np.asarray(points @ self.normal - self.offset)
+
     def limbs_of(self, kind: str) -> list[Limb]:
         """Return the sleeves, or the legs."""
         return [limb for limb in self.limbs if limb.kind == kind]
+
+    def mate(self, limb: Limb) -> Limb | None:
+        """Return the limb of the same kind on the other side, if there is one."""
+        return next((one for one in self.limbs_of(limb.kind) if one.side == -limb.side), None)
 
     def border(self, role: str) -> Border | None:
         """Return the longest border of a role, if there is one."""
         return next((border for border in self.borders if border.role == role), None)
 
 
-def find_anatomy(cloth: Cloth, operators: Operators, *, up: str | None = None, front: str | None = None) -> Anatomy:
+def find_anatomy(cloth: Cloth, *, up: str | None = None, front: str | None = None) -> Anatomy:
     """Find out what a garment is.
 
     Args:
         cloth: one connected part, its normals pointing out.
-        operators: of its mesh.
         up, front: directions as "+y", "-z", where the user says them; +y and +z are tried first otherwise.
     """
-    loops = [_measured(cloth.vertices, loop) for loop in cloth.borders()]
+    loops = [Border.measured(cloth.vertices, loop) for loop in cloth.loops]
     if up:
-        made = _worn(cloth, operators, loops, AXES[up], front)
+        made = _worn(cloth, loops, AXES[up], front)
     else:
-        size = float(np.sqrt(cloth.face_areas.sum()))
-        first = _upward([one for one in loops if one[1] >= HOLE * size], cloth.vertices)
-        made = _worn(cloth, operators, loops, first, front)
-        turned = _worn(cloth, operators, loops, -first, front)
+        first = _upward([one for one in loops if one.length >= HOLE * cloth.size], cloth.vertices)
+        made, turned = (_worn(cloth, loops, way, front) for way in (first, -first))
         made = turned if _wearable(cloth, turned) > _wearable(cloth, made) + _SURELY else made
         if made.up[1] < 0.5 and len(loops) > 1:
             why = "as its openings lie" if made.up @ first > 0.5 else "as nobody could wear it the other way up"
             words = f"up is taken as {axis_name(made.up)}, {why}; --up says otherwise"
             made = replace(made, notes=(words, *made.notes))
     if made.symmetric:
-        mirror = mirror_map(cloth.vertices, cloth.faces, made.normal, made.offset, reach=0.05 * made.size)
-        made = replace(made, mirror=mirror)
+        made = replace(made, mirror=mirror_map(cloth, made.normal, made.offset, reach=BESIDE_LINE * made.size))
     return made
 
 
@@ -217,10 +240,10 @@ def _wearable(cloth: Cloth, anatomy: Anatomy) -> float:
             return 0.0
         ring = cloth.vertices[np.append(opening.vertices, opening.vertices[0])]
         level = heights[opening.vertices]
-        at_end = (level > level.max() - _END * tall) if highest else (level < level.min() + _END * tall)
+        at_end = (level > level.max() - END * tall) if highest else (level < level.min() + END * tall)
         return float(np.linalg.norm(np.diff(ring, axis=0), axis=1)[at_end].sum())
 
-    if anatomy.kind not in ("top", "dress", "skirt", "trousers", "jumpsuit"):
+    if anatomy.kind not in TAILORED:
         return -0.5
     if anatomy.kind == "trousers":
         return 0.0
@@ -239,25 +262,16 @@ def _wearable(cloth: Cloth, anatomy: Anatomy) -> float:
     return (below - above) / (below + above) + hang + begin
 
 
-def _worn(
-    cloth: Cloth,
-    operators: Operators,
-    raw: Sequence[tuple[FloatArray, float, FloatArray, Ids]],
-    upward: FloatArray,
-    front: str | None,
-) -> Anatomy:
+def _worn(cloth: Cloth, raw: Sequence[Border], upward: FloatArray, front: str | None) -> Anatomy:
     """Return what a garment is that is worn with `upward` up, without its mirror images; see `find_anatomy`.
 
     `raw` are its borders, measured.
     """
-    size = float(np.sqrt(cloth.face_areas.sum()))
+    size = cloth.size
     notes: list[str] = []
-    normal, offset, asymmetry = _plane_of_symmetry(
-        cloth.vertices, _above_slanted_hem(cloth.vertices, operators.mass, upward, raw, size), upward, size
-    )
+    normal, offset, asymmetry = _plane_of_symmetry(cloth.vertices, _above_slanted_hem(cloth, upward, raw), upward, size)
     holds = asymmetry <= _SYMMETRIC * size
-    side = np.cross(upward, normal)
-    side /= max(float(np.linalg.norm(side)), 1e-300)
+    side = unit(np.cross(upward, normal))
     beside, ahead = (
         [abs(float(border.middle @ across) - at) for border in _roles(raw, across, at, size) if border.role == "limb"]
         for across, at in ((normal, offset), (side, float(np.median(cloth.vertices @ side))))
@@ -265,46 +279,42 @@ def _worn(
     # A sleeve that comes forward is beside the plane between front and back, too, yet it is farther off to its side.
     one_sleeve = (
         holds
-        and sum(one[1] >= HOLE * size for one in raw) > 2
+        and sum(one.length >= HOLE * size for one in raw) > 2
         and len(beside) < 2
         and max(ahead, default=0.0) > max(beside, default=0.0)
     )
     if one_sleeve:
         # The plane lies between front and back.
         holds = False
+    forward = AXES["+z"] if abs(upward[2]) < 0.5 else AXES["-y"]
     if front:
-        forward = AXES[front] - (AXES[front] @ upward) * upward
-        if np.linalg.norm(forward) < 0.5:
-            forward = AXES["+z"] if abs(upward[2]) < 0.5 else AXES["-y"]
-    else:
-        forward = AXES["+z"] if abs(upward[2]) < 0.5 else AXES["-y"]
-        if one_sleeve:
-            forward = np.cross(side, upward) * (1.0 if np.cross(side, upward) @ forward >= 0.0 else -1.0)
+        given = AXES[front] - (AXES[front] @ upward) * upward
+        forward = given if np.linalg.norm(given) >= 0.5 else forward
+    elif one_sleeve:
+        across = np.cross(side, upward)
+        forward = across * (1.0 if across @ forward >= 0.0 else -1.0)
     if holds:
-        level = normal - (normal @ upward) * upward
-        level /= np.linalg.norm(level)
+        level = unit(normal - (normal @ upward) * upward)
         across = np.cross(upward, forward)
         # Front is at right angles to the plane of symmetry, unless the user says that it is not.
         if abs(across @ level) > 0.5 or not front:
             turned = np.cross(level, upward)
             forward = turned * (1.0 if turned @ forward >= -1e-9 else -1.0)
-    left = np.cross(upward, forward)
-    left /= np.linalg.norm(left)
+    left = unit(np.cross(upward, forward))
     forward = np.cross(left, upward)
     if not holds or abs(normal @ left) < 0.5:
         normal, offset = left, float(np.median(cloth.vertices @ left))
     normal, offset = (normal, offset) if normal @ left > 0 else (-normal, -offset)
     borders = _roles(raw, normal, offset, size)
-    heights = cloth.vertices @ upward
-    kind, borders, open_front = _kind(cloth, borders, upward, heights, size)
-    limbs = _limbs(cloth, borders, upward, kind, size)
+    kind, borders, open_front = _kind(cloth, borders, upward)
+    limbs = _limbs(cloth, borders, upward)
     if holds:
         # An armhole whose facing is as long as the shortest sleeve is the same on both sides.
         both = {(limb.kind, limb.side) for limb in limbs}
         mates = {(border.role, -border.side) for border in borders}
         limbs = [limb for limb in limbs if (limb.kind, limb.side) not in mates or (limb.kind, -limb.side) in both]
     if front is None:
-        turned_words = _faces_backwards(cloth, borders, kind, upward, forward, open_front, size)
+        turned_words = _faces_backwards(cloth, borders, kind, upward, forward, open_front)
         if turned_words:
             notes.append(turned_words)
             forward, left, normal, offset = -forward, -left, -normal, -offset
@@ -334,6 +344,12 @@ def _worn(
     )
 
 
+def has_role(cloth: Cloth, vertices: Ids, *roles: str) -> NDArray[np.bool_]:
+    """Return whether vertices of a cloth whose field "role" says so are at borders of some roles."""
+    known = np.round(cloth.values["role"][vertices]) if "role" in cloth.values else np.zeros(len(vertices))
+    return np.isin(known, [1 + ROLES.index(role) for role in roles])
+
+
 def describe(anatomy: Anatomy) -> str:
     """Return what a garment is, in a few words: "top, two sleeves, open in front"."""
     words: list[str] = [anatomy.kind]
@@ -346,28 +362,16 @@ def describe(anatomy: Anatomy) -> str:
     return ", ".join(words)
 
 
-def _measured(vertices: FloatArray, loop: Ids) -> tuple[FloatArray, float, FloatArray, Ids]:
-    """Return middle, length and area vector over the length squared of a loop, and its vertices."""
-    points = vertices[loop]
-    following = np.roll(points, -1, axis=0)
-    steps = np.linalg.norm(following - points, axis=1)
-    length = float(steps.sum())
-    middle = ((points + following) * (0.5 * steps[:, None])).sum(axis=0) / max(length, 1e-300)
-    area = 0.5 * np.cross(points - middle, following - middle).sum(axis=0)
-    return middle, length, area * (4.0 * np.pi / max(length, 1e-300) ** 2), loop
-
-
-def _upward(loops: Sequence[tuple[FloatArray, float, FloatArray, Ids]], vertices: FloatArray) -> FloatArray:
+def _upward(loops: Sequence[Border], vertices: FloatArray) -> FloatArray:
     """Return +y, or +z where the openings lie level in z and not in y, or a garment that is open in front lies on its back."""
     if not loops:
         return AXES["+y"]
-    level = sum(length * np.abs(normal) for _, length, normal, _ in loops)
-    assert isinstance(level, np.ndarray)
-    _, longest, facing, _ = max(loops, key=lambda one: one[1])
-    if np.linalg.norm(facing) < _RING and longest > 0.5 * sum(one[1] for one in loops):
+    level = np.sum([one.length * np.abs(one.normal) for one in loops], axis=0)
+    longest = max(loops, key=lambda one: one.length)
+    if np.linalg.norm(longest.normal) < RING and longest.length > 0.5 * sum(one.length for one in loops):
         # The thinnest way through it is from back to front.
         through = np.linalg.eigh(np.cov(vertices.T))[1][:, 0]
-        return AXES["+z"] if abs(through[1]) > _LIES_ON_BACK else AXES["+y"]
+        return AXES["+z"] if np.abs(through).argmax() == 1 else AXES["+y"]
     return AXES["+z"] if level[2] > 2.0 * level[1] and level[2] > level[0] else AXES["+y"]
 
 
@@ -377,22 +381,16 @@ def axis_name(direction: FloatArray) -> str:
     return f"{'+' if direction[k] > 0 else '-'}{'xyz'[k]}"
 
 
-def _above_slanted_hem(
-    vertices: FloatArray,
-    mass: FloatArray,
-    upward: FloatArray,
-    loops: Sequence[tuple[FloatArray, float, FloatArray, Ids]],
-    size: float,
-) -> FloatArray:
+def _above_slanted_hem(cloth: Cloth, upward: FloatArray, loops: Sequence[Border]) -> FloatArray:
     """Return the masses of vertices [m2]; 0 beside a hem that slants: it says nothing about the body."""
-    heights = vertices @ upward
-    wide = [heights[loop] for _, length, _, loop in loops if length >= HOLE * size]
+    heights = cloth.vertices @ upward
+    wide = [heights[one.vertices] for one in loops if one.length >= HOLE * cloth.size]
     if len(wide) < 2:
-        return mass
+        return cloth.mass
     hem = min(wide, key=lambda own: float(own.mean()))
-    above = mass * (heights > hem.max())
-    slants = np.ptp(hem) > _SLANT * np.ptp(heights) and above.sum() > _ENOUGH_ABOVE * mass.sum()
-    return above if slants else mass
+    above = cloth.mass * (heights > hem.max())
+    slants = np.ptp(hem) > _SLANT * np.ptp(heights) and above.sum() > _ENOUGH_ABOVE * cloth.mass.sum()
+    return above if slants else cloth.mass
 
 
 # Rounds of closest points for the plane of symmetry that is taken.
@@ -448,171 +446,120 @@ def _plane_of_symmetry(
     return best[1], best[2], max(0.0, best[0] - 0.5 * spacing)
 
 
-def _roles(
-    raw: Sequence[tuple[FloatArray, float, FloatArray, Ids]],
-    normal: FloatArray,
-    offset: float,
-    size: float,
-) -> list[Border]:
+def _roles(raw: Sequence[Border], normal: FloatArray, offset: float, size: float) -> list[Border]:
     """Return the borders: pairs beside the plane of symmetry as "limb", those in the middle as "middle", and holes."""
-    across = np.array([middle @ normal - offset for middle, *_ in raw])
-    roles = ["hole" if length < HOLE * size else "middle" for _, length, *_ in raw]
+    across = [float(one.middle @ normal) - offset for one in raw]
+    roles = ["hole" if one.length < HOLE * size else "middle" for one in raw]
     pairs = []
-    for i, (middle, length, *_) in enumerate(raw):
-        for j in range(i + 1, len(raw)):
-            if "hole" in (roles[i], roles[j]) or across[i] * across[j] >= 0.0:
-                continue
-            image = reflected(middle, normal, offset)
-            away = float(np.linalg.norm(image - raw[j][0]))
-            ratio = max(length, raw[j][1]) / min(length, raw[j][1])
-            if (
-                away < _PAIR * size
-                and away < 0.7 * abs(across[i] - across[j])
-                and ratio < _PAIR_RATIO
-                and min(abs(across[i]), abs(across[j])) > _BESIDE * size
-            ):
-                pairs.append((away, i, j))
+    for i, j in combinations(range(len(raw)), 2):
+        if "hole" in (roles[i], roles[j]) or across[i] * across[j] >= 0.0:
+            continue
+        away = float(np.linalg.norm(reflected(raw[i].middle, normal, offset) - raw[j].middle))
+        short, long = sorted((raw[i].length, raw[j].length))
+        if (
+            away < _PAIR * size
+            and away < 0.7 * abs(across[i] - across[j])
+            and long < _PAIR_RATIO * short
+            and min(abs(across[i]), abs(across[j])) > _BESIDE * size
+        ):
+            pairs.append((away, i, j))
     for _, i, j in sorted(pairs):
         if roles[i] == roles[j] == "middle":
             roles[i] = roles[j] = "limb"
-    widest = max((abs(x) for x in across), default=0.0)
-    longest = max((length for _, length, *_ in raw), default=0.0)
-    for i, (_, length, *_) in enumerate(raw):
+    widest = max(map(abs, across), default=0.0)
+    longest = max((one.length for one in raw), default=0.0)
+    for i, one in enumerate(raw):
         # One sleeve alone.
-        if roles[i] == "middle" and abs(across[i]) > max(0.15 * size, 0.5 * widest) and length < 0.6 * longest:
+        if roles[i] == "middle" and abs(across[i]) > max(0.15 * size, 0.5 * widest) and one.length < 0.6 * longest:
             roles[i] = "limb"
     return [
-        Border(
-            vertices=loop,
-            middle=middle,
-            length=length,
-            normal=area,
-            role=roles[i],
-            side=int(np.sign(across[i])) if roles[i] == "limb" else 0,
-        )
-        for i, (middle, length, area, loop) in enumerate(raw)
+        replace(one, role=role, side=int(np.sign(at)) if role == "limb" else 0)
+        for one, role, at in zip(raw, roles, across, strict=True)
     ]
 
 
-def _kind(
-    cloth: Cloth, borders: Sequence[Border], upward: FloatArray, heights: FloatArray, size: float
-) -> tuple[Kind, list[Border], bool]:
+def _kind(cloth: Cloth, borders: Sequence[Border], upward: FloatArray) -> tuple[Kind, list[Border], bool]:
     """Return the kind, the borders with their roles, and whether the front is open."""
-    low, high = float(heights.min()), float(heights.max())
-    tall = max(high - low, 1e-300)
-    around = [border.length for border in borders if border.role == "middle"]
+    heights = cloth.vertices @ upward
+    tall = max(float(np.ptp(heights)), 1e-300)
+
+    def level(border: Border) -> float:
+        return float(border.middle @ upward)
+
+    def span(border: Border) -> float:
+        return float(np.ptp(heights[border.vertices])) / tall
+
+    middles = sorted((border for border in borders if border.role == "middle"), key=level)
     # No arm and no leg is as thin as that; what has one more opening alone, and ends at the thigh, is as wide as a thigh.
-    thigh = _THIGH * around[0] if len(around) == 1 and tall < _TO_THE_THIGH else 0.0
+    thigh = _THIGH * middles[0].length if len(middles) == 1 and tall < _TO_THE_THIGH else 0.0
     thin = max(_HANDS[0], thigh)
-    limbs = [i for i, border in enumerate(borders) if border.role == "limb" and border.length > thin]
-    if tall < _LEAST_BODY[0] or (len(limbs) < 4 and max(around, default=0.0) < _LEAST_BODY[1]):
+    limbs = sorted((border for border in borders if border.role == "limb" and border.length > thin), key=level)
+    girth = max((border.length for border in middles), default=0.0)
+    if tall < _LEAST_BODY[0] or (len(limbs) < 4 and girth < _LEAST_BODY[1]):
         limbs = []
-    borders = [
-        replace(border, role="hole", side=0) if border.role == "limb" and i not in limbs else border
-        for i, border in enumerate(borders)
-    ]
-    middles = [i for i, border in enumerate(borders) if border.role == "middle"]
-    roles = {i: border.role for i, border in enumerate(borders)}
-    level = {i: float(borders[i].middle @ upward) for i in range(len(borders))}
-
-    def reach(i: int) -> tuple[float, float]:
-        own = heights[borders[i].vertices]
-        return float(own.min()), float(own.max())
-
-    spans = {i: (reach(i)[1] - reach(i)[0]) / tall for i in middles}
     # An opening from top to bottom is no ring.
-    open_front = len(limbs) > 0 and any(
-        span > _OPEN and np.linalg.norm(borders[i].normal) < _RING for i, span in spans.items()
-    )
-    kind: Kind = "other"
-    if not borders or all(role == "hole" for role in roles.values()):
-        kind = "closed"
-    elif len(limbs) >= 4:
+    open_front = bool(limbs) and any(span(one) > _OPEN and np.linalg.norm(one.normal) < RING for one in middles)
+    roles = dict.fromkeys(middles, "border")
+    kind: Kind = "other" if middles else "closed"
+    if len(limbs) >= 4:
         kind = "jumpsuit"
-        order = sorted(limbs, key=lambda i: level[i])
-        for i in order[:2]:
-            roles[i] = "leg"
-        for i in order[2:]:
-            roles[i] = "sleeve"
-        for i in middles:
-            roles[i] = "opening" if spans[i] > _OPEN else "neck"
-    elif limbs and len(middles) == 1 and not open_front:
-        i = middles[0]
-        if all(level[k] < level[i] for k in limbs):
-            kind = "trousers"
-            roles[i] = "waist"
-            for k in limbs:
-                roles[k] = "leg"
-        else:
-            kind = "top"
-            roles[i] = "hem" if level[i] < (low + high) / 2 else "neck"
-            for k in limbs:
-                roles[k] = "sleeve"
+        roles |= {border: "leg" if number < 2 else "sleeve" for number, border in enumerate(limbs)}
+        roles |= {border: "opening" if span(border) > _OPEN else "neck" for border in middles}
+    elif limbs and len(middles) == 1 and not open_front and level(limbs[-1]) < level(middles[0]):
+        kind = "trousers"
+        roles |= {middles[0]: "waist"} | dict.fromkeys(limbs, "leg")
     elif limbs:
-        order = sorted(middles, key=lambda i: level[i])
         kind = "top"
-        for i in middles:
-            roles[i] = "border"
+        roles |= dict.fromkeys(limbs, "sleeve")
         if open_front:
-            roles[max(middles, key=lambda i: spans[i])] = "opening"
-        elif order:
-            roles[order[0]], roles[order[-1]] = "hem", "neck"
-        for k in limbs:
-            roles[k] = "sleeve"
-    elif len(middles) == 2:
-        a, b = sorted(middles, key=lambda i: level[i])
-        girth = 0.5 * (borders[a].length + borders[b].length)
-        apart = float(np.linalg.norm(borders[a].middle - borders[b].middle))
-        upright = abs(level[b] - level[a]) > 0.5 * apart
-        if apart < 0.2 * girth:
-            kind = "band"
-            roles[a], roles[b] = "border", "border"
-        elif upright and girth > _SLIMMEST:
-            kind = _around_the_trunk(cloth, borders[b], reach(a)[1], upward)
-            roles[a], roles[b] = "hem", "waist" if kind == "skirt" else "neck"
+            roles[max(middles, key=span)] = "opening"
+        elif len(middles) == 1:
+            roles[middles[0]] = "hem" if level(middles[0]) < 0.5 * (heights.min() + heights.max()) else "neck"
         else:
-            ratio = max(borders[a].length, borders[b].length) / min(borders[a].length, borders[b].length)
-            kind = "sleeve" if girth < _SLIMMEST and apart > 0.75 * girth and ratio < _PAIR_RATIO else "other"
-            roles[a], roles[b] = "border", "border"
-    elif len(middles) == 1:
-        kind = _one_border(cloth, borders[middles[0]], upward, size)
-        roles[middles[0]] = "border"
-    else:
-        for i in middles:
-            roles[i] = "border"
-    if kind == "top":
-        hem = next((i for i, role in roles.items() if role == "hem"), None)
-        arms = [i for i, role in roles.items() if role == "sleeve"]
-        if hem is not None and arms:
-            # From the armhole down, a dress is longer than a body is to the hip.
-            above = max(level[i] for i in arms)
-            top = max([level[i] for i, role in roles.items() if role == "neck"] or [above])
-            if top - reach(hem)[0] > _LONG or (top - reach(hem)[0]) > 1.9 * _trunk_width(cloth, borders, upward):
-                kind = "dress"
-            faces_down = abs(borders[hem].normal @ upward) > _DOWN * np.linalg.norm(borders[hem].normal)
-            if not (faces_down and min(_widening(cloth, borders[i]) for i in (hem, *arms)) < _TUBE):
+            roles[middles[0]], roles[middles[-1]] = "hem", "neck"
+        if (hem := next((border for border in middles if roles[border] == "hem"), None)) is not None:
+            faces_down = abs(hem.normal @ upward) > FACES * np.linalg.norm(hem.normal)
+            if not (faces_down and min(_widening(cloth, border) for border in (hem, *limbs)) < _TUBE):
                 # A ball with holes.
-                kind = "other"
-                roles = {i: "hole" if role == "hole" else "border" for i, role in roles.items()}
-    made = [replace(border, role=roles[i]) for i, border in enumerate(borders)]
+                kind, roles = "other", dict.fromkeys((*middles, *limbs), "border")
+            else:
+                # From the neck, or the armhole, down, a dress is longer than a body is to the hip.
+                top = level(limbs[-1] if middles[-1] is hem else middles[-1])
+                long = top - float(heights[hem.vertices].min())
+                kind = "dress" if long > min(_LONG, 0.95 * hem.length) else "top"
+    elif len(middles) == 2:
+        kind = _between_two(cloth, middles[0], middles[1], upward)
+        if kind in TAILORED:
+            roles = {middles[0]: "hem", middles[1]: "waist" if kind == "skirt" else "neck"}
+    elif len(middles) == 1:
+        kind = _one_border(cloth, middles[0], upward)
+    hidden = [border for border in borders if border.role == "limb" and border not in limbs]
+    made = [
+        replace(border, role="hole", side=0)
+        if border in hidden
+        else replace(border, role=roles.get(border, border.role))
+        for border in borders
+    ]
     return kind, made, open_front
 
 
 def _widening(cloth: Cloth, border: Border) -> float:
     """Return the area within a border's radius of it, over that of a tube: more than 1 for a ball."""
     radius = border.length / (2.0 * np.pi)
-    edges = mesh_edges(cloth.faces.astype(np.int32)).astype(np.int64)
-    long = np.linalg.norm(cloth.vertices[edges[:, 0]] - cloth.vertices[edges[:, 1]], axis=1)
-    graph = coo_array((long, (edges[:, 0], edges[:, 1])), shape=(len(cloth.vertices),) * 2).tocsr()
-    far = dijkstra(graph, directed=False, indices=border.vertices, min_only=True)
+    far = dijkstra(cloth.graph, directed=False, indices=border.vertices, min_only=True)
     near = far[cloth.faces].mean(axis=1) <= radius
     return float(cloth.face_areas[near].sum() / max(radius * border.length, 1e-300))
 
 
-def _trunk_width(cloth: Cloth, borders: Sequence[Border], upward: FloatArray) -> float:
-    """Return the girth of the lowest middle border over two: about how wide the garment is, laid flat."""
-    hem = min((b for b in borders if b.role == "middle"), key=lambda b: float(b.middle @ upward))
-    return 0.5 * hem.length
+def _between_two(cloth: Cloth, lower: Border, upper: Border, upward: FloatArray) -> Kind:
+    """Return what a tube or a ring between two borders is: a band, around the trunk, a sleeve, or something else."""
+    short, long = sorted((lower.length, upper.length))
+    girth, apart = 0.5 * (short + long), float(np.linalg.norm(upper.middle - lower.middle))
+    if apart < 0.2 * girth:
+        return "band"
+    if float((upper.middle - lower.middle) @ upward) > 0.5 * apart and girth > _SLIMMEST:
+        return _around_the_trunk(cloth, upper, float((cloth.vertices[lower.vertices] @ upward).max()), upward)
+    return "sleeve" if girth < _SLIMMEST and apart > 0.75 * girth and long < _PAIR_RATIO * short else "other"
 
 
 def _around_the_trunk(cloth: Cloth, upper: Border, low: float, upward: FloatArray) -> Kind:
@@ -640,20 +587,19 @@ def _around_the_trunk(cloth: Cloth, upper: Border, low: float, upward: FloatArra
     near = heights[cloth.faces].mean(axis=1) > high - _SHOULDERS * (high - low)
     area = cloth.face_areas[near]
     lies = float((np.abs(cloth.face_normals[near] @ upward) * area).sum() / max(float(area.sum()), 1e-300))
-    if upper.length < _NECKS and lies > _LIES:
+    if upper.length < _NECKS and lies > FACES:
         return "dress" if high - low > _LONG else "top"
     if girths[narrowest] > _WAISTED * girths[0]:
         return "skirt"
     return "dress" if levels[narrowest] - low > _BELOW_WAIST else "top"
 
 
-def _one_border(cloth: Cloth, border: Border, upward: FloatArray, size: float) -> Kind:
+def _one_border(cloth: Cloth, border: Border, upward: FloatArray) -> Kind:
     """Return what a thing with one border is: a hat, a sock or a glove if its size and its shape say so, else "other"."""
-    holes = len(border_loops(cloth.faces.astype(np.int32)))
-    others = [loop for loop in cloth.borders() if not np.array_equal(np.sort(loop), np.sort(border.vertices))]
-    if sum(_measured(cloth.vertices, loop)[1] for loop in others) > 0.5 * border.length:
+    others = [loop for loop in cloth.loops if not np.array_equal(np.sort(loop), np.sort(border.vertices))]
+    if sum(polyline_length(cloth.vertices[loop], closed=True) for loop in others) > 0.5 * border.length:
         return "other"
-    if border.length > 3.0 * size or euler_characteristic(cloth.faces.astype(np.int32)) != 2 - holes:
+    if border.length > 3.0 * cloth.size or sum(cloth.shape) != 2:
         # A disk that is no deeper than a panel, or a thing with a handle, as a mug.
         return "other"
     way = cloth.vertices - border.middle
@@ -674,8 +620,7 @@ def _one_border(cloth: Cloth, border: Border, upward: FloatArray, size: float) -
             return "sock"
     # A hand is flat, and its thumb or its fingers stand apart.
     areas = cloth.face_areas
-    along = areas @ way[cloth.faces].mean(axis=1)
-    along /= max(float(np.linalg.norm(along)), 1e-300)
+    along = unit(areas @ way[cloth.faces].mean(axis=1))
     reach = way @ along
     outer = way[reach > 0.4 * reach.max()]
     outer = outer - np.outer(outer @ along, along)
@@ -690,15 +635,12 @@ def _one_border(cloth: Cloth, border: Border, upward: FloatArray, size: float) -
     return "other"
 
 
-def _limbs(cloth: Cloth, borders: Sequence[Border], upward: FloatArray, kind: Kind, size: float) -> list[Limb]:
+def _limbs(cloth: Cloth, borders: Sequence[Border], upward: FloatArray) -> list[Limb]:
     """Return the limbs with their forks, which the shortest ways between borders pass through."""
     arms = [i for i, border in enumerate(borders) if border.role == "sleeve"]
     legs = [i for i, border in enumerate(borders) if border.role == "leg"]
     if not arms and not legs:
         return []
-    edges = mesh_edges(cloth.faces.astype(np.int32)).astype(np.int64)
-    long = np.linalg.norm(cloth.vertices[edges[:, 0]] - cloth.vertices[edges[:, 1]], axis=1)
-    graph = coo_array((long, (edges[:, 0], edges[:, 1])), shape=(len(cloth.vertices),) * 2).tocsr()
     heights = cloth.vertices @ upward
     found = []
     for i in (*arms, *legs):
@@ -710,13 +652,14 @@ def _limbs(cloth: Cloth, borders: Sequence[Border], upward: FloatArray, kind: Ki
                 continue
             goal = np.concatenate(ends)
             goal = goal[heights[goal] <= heights[goal].min() + 0.25 * (heights.max() - heights[goal].min())]
-            # Borders of the garment's own side, so that the way runs down this side.
         else:
             mates = [borders[j].vertices for j in legs if j != i]
             if not mates:
                 continue
             goal = np.concatenate(mates)
-        far, before, _ = dijkstra(graph, directed=False, indices=own.vertices, min_only=True, return_predecessors=True)
+        far, before, _ = dijkstra(
+            cloth.graph, directed=False, indices=own.vertices, min_only=True, return_predecessors=True
+        )
         end = int(goal[np.argmin(far[goal])])
         if not np.isfinite(far[end]):
             continue
@@ -724,8 +667,8 @@ def _limbs(cloth: Cloth, borders: Sequence[Border], upward: FloatArray, kind: Ki
         while before[way[-1]] >= 0:
             way.append(int(before[way[-1]]))
         points = cloth.vertices[way[::-1]]
-        fork, along, length, bend = _fork(points, upward, size)
-        if i in arms and (bend < _STRAIGHT or length < _SHORTEST_SLEEVE * size):
+        fork, along, length, bend = _fork(points, upward, cloth.size)
+        if i in arms and (bend < _STRAIGHT or length < _SHORTEST_SLEEVE * cloth.size):
             continue
         found.append(
             Limb(
@@ -746,16 +689,14 @@ def averaged_limbs(anatomy: Anatomy, *, alike: bool) -> tuple[Limb, ...]:
         return anatomy.limbs
     made = []
     for limb in anatomy.limbs:
-        mate = next((one for one in anatomy.limbs if one.kind == limb.kind and one.side == -limb.side), None)
+        mate = anatomy.mate(limb)
         if mate is not None:
             along = reflected(mate.along, anatomy.normal)
             fork = anatomy.image(mate.fork)
-            near = along @ limb.along > _SAME_WAY and np.linalg.norm(fork - limb.fork) < _BESIDE * anatomy.size
+            near = along @ limb.along > SAME_WAY and np.linalg.norm(fork - limb.fork) < _BESIDE * anatomy.size
             if alike or near:
-                both = along + limb.along
-                both /= np.linalg.norm(both)
                 length = 0.5 * (limb.length + mate.length)
-                limb = replace(limb, along=both, fork=0.5 * (fork + limb.fork), length=length)
+                limb = replace(limb, along=unit(along + limb.along), fork=0.5 * (fork + limb.fork), length=length)
         made.append(limb)
     return tuple(made)
 
@@ -766,10 +707,7 @@ def _fork(points: FloatArray, upward: FloatArray, size: float) -> tuple[FloatArr
     Returns:
         The place, the direction, the length from the first point to the place [m], and the cosine of the angle between both legs.
     """
-    from warpflat.core import arc_lengths, points_at_lengths
-
-    arc = arc_lengths(points)
-    total = float(arc[-1])
+    total = polyline_length(points)
     samples = np.linspace(0.0, total, 201)
     line = points_at_lengths(points, samples)
     for _ in range(2):
@@ -780,10 +718,7 @@ def _fork(points: FloatArray, upward: FloatArray, size: float) -> tuple[FloatArr
     def legs(at: int) -> tuple[FloatArray, FloatArray, int]:
         r = max(3, min(at, 200 - at, reach))
         low, high = max(0, at - r), min(200, at + r)
-        one, other = line[low] - line[at], line[high] - line[at]
-        one /= max(float(np.linalg.norm(one)), 1e-300)
-        other /= max(float(np.linalg.norm(other)), 1e-300)
-        return one, other, r
+        return unit(line[low] - line[at]), unit(line[high] - line[at]), r
 
     # Where it comes up from the limb and goes down again. At the waist a way bends, too, and a short sleeve bends it near its end only.
     rises = [-r * float((one + other) @ upward) for one, other, r in map(legs, range(1, 200))]
@@ -797,38 +732,25 @@ def _fork(points: FloatArray, upward: FloatArray, size: float) -> tuple[FloatArr
         if new == at:
             break
         at = new
-    along = line[0] - line[at]
-    return line[at], along / max(float(np.linalg.norm(along)), 1e-300), float(samples[at]), float(one @ other)
+    return line[at], unit(line[0] - line[at]), float(samples[at]), float(one @ other)
 
 
 def _faces_backwards(
-    cloth: Cloth,
-    borders: Sequence[Border],
-    kind: Kind,
-    upward: FloatArray,
-    forward: FloatArray,
-    open_front: bool,
-    size: float,
+    cloth: Cloth, borders: Sequence[Border], kind: Kind, upward: FloatArray, forward: FloatArray, open_front: bool
 ) -> str:
-    """Return why the garment faces the other way, or "": an opening lies in front, a neck is lower in front, a seat is behind."""
+    """Return why the garment faces the other way, or "": an opening lies in front, a neck is lower in front."""
     heights, depth = cloth.vertices @ upward, cloth.vertices @ forward
-    middle = float(np.median(depth))
-    for border in borders:
-        own = border.vertices
-        if open_front and border.role == "opening":
-            # Between top and bottom only the edges of the opening are left.
-            low, high = heights[own].min(), heights[own].max()
-            inner = own[(heights[own] > low + 0.3 * (high - low)) & (heights[own] < low + 0.7 * (high - low))]
-            if len(inner) and np.median(depth[inner]) < middle - 0.02 * size:
-                return (
-                    f"it opens at the {axis_name(-forward)} side, which is taken as its front; --front says otherwise"
-                )
-            return ""
-    for border in borders:
-        own = border.vertices
-        if border.role == "neck" and kind in ("top", "dress"):
-            ahead = depth[own] > np.median(depth[own])
-            drop = float(np.quantile(heights[own[~ahead]], 0.1) - np.quantile(heights[own[ahead]], 0.1))
-            if drop < -0.06 * size:
-                return f"its neck is lower at the {axis_name(-forward)} side, which is taken as its front; --front says otherwise"
+    told = f"at the {axis_name(-forward)} side, which is taken as its front; --front says otherwise"
+    opening = next((border.vertices for border in borders if border.role == "opening"), None)
+    if open_front and opening is not None:
+        # Between top and bottom only the edges of the opening are left.
+        own = heights[opening]
+        inner = opening[np.abs(own - 0.5 * (own.min() + own.max())) < 0.2 * np.ptp(own)]
+        behind = len(inner) > 0 and np.median(depth[inner]) < np.median(depth) - 0.02 * cloth.size
+        return f"it opens {told}" if behind else ""
+    neck = next((border.vertices for border in borders if border.role == "neck"), None)
+    if neck is not None and kind in ("top", "dress"):
+        ahead = depth[neck] > np.median(depth[neck])
+        front, back = (np.quantile(heights[neck[chosen]], 0.1) for chosen in (ahead, ~ahead))
+        return f"its neck is lower {told}" if front - back > 0.06 * cloth.size else ""
     return ""

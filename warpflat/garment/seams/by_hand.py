@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from warpflat.core import FloatArray, InputError, arc_lengths, points_at_lengths, project_on_segments, quote_value
 from warpflat.flat import Surface, SurfacePath, are_joined, geodesic_path, locate, plane_sections, polyline_path
-from warpflat.garment.seams.anatomy import Anatomy
-from warpflat.garment.seams.cloth import Cloth, edge_components, section
+from warpflat.garment.seams.anatomy import FROM_SHOULDERS, TAILORED, Anatomy
+from warpflat.garment.seams.cloth import LEVELS, Cloth, are_among, edge_components, section
 from warpflat.garment.seams.options import SeamCut, SeamOptions, in_family
-from warpflat.garment.seams.tailor import BESIDE, FACING, LEFT, tidied
+from warpflat.garment.seams.symmetric import SAME_PLACE
+from warpflat.garment.seams.tailor import BESIDE, LEFT, centre_lines
 
 __all__ = ["HAND", "cut_by_hand", "join_ends", "keep_seams", "leave_to_hand", "level_of"]
 
@@ -36,12 +37,10 @@ _REACH = 0.015
 _MOSTLY = 0.6
 # A curve in which a plane meets the cloth is a wrinkle below this share of the longest one.
 _WRINKLE = 0.05
-# Steps of a polyline over the cloth, in lengths of its edges, and how many there are at most.
-_STEP, _MOST_STEPS = 3.0, 400
-# Vertices of the file that were joined lie at one place, within this share of its diagonal.
-_SAME = 1e-5
-# Girths are measured at so many heights. A yoke lies so far down from the shoulder to the armpit, or from the waist to the crotch.
-_LEVELS, _YOKE = 32, 0.4
+# Steps of a polyline over the cloth, in lengths of its edges.
+_STEP = 3.0
+# A yoke lies so far down from the shoulder to the armpit, or from the waist to the crotch.
+_YOKE = 0.4
 
 
 def cut_by_hand(
@@ -87,7 +86,6 @@ def _paths(
     cloths: Sequence[Cloth], surfaces: Sequence[Surface], cut: SeamCut
 ) -> Iterator[tuple[int, SurfacePath | Ids]]:
     """Yield the paths of a cut, or its edges, each with the number of its layer; the layers may be cut in between."""
-    sizes = [float(np.sqrt(cloth.face_areas.sum())) for cloth in cloths]
     if cut.edges:
         rows = [np.asarray(row, dtype=np.int64) for row in cut.edges]
         layers, lies = _owners(surfaces, rows)
@@ -101,7 +99,7 @@ def _paths(
             if len(broken):
                 a, b = asked[broken[0]]
                 raise InputError(f"no edge of the mesh joins vertices {a} and {b} (counted from 0)")
-            yield layer, _new_edges(cloths[layer], np.sort(edges, axis=1))
+            yield layer, cloths[layer].new_edges(np.unique(np.sort(edges, axis=1), axis=0))
         return
     if cut.plane is not None:
         point, normal = (np.asarray(value, dtype=float) for value in cut.plane)
@@ -134,7 +132,7 @@ def _paths(
     layer = owners[0] if owners else int(off.sum(axis=1).argmin())
     surface = whole[layer]
     for point, away in zip(given, off[layer], strict=True):
-        if away > _FAR * sizes[layer]:
+        if away > _FAR * cloths[layer].size:
             x, y, z = point.tolist()
             raise InputError(f"the point ({x:g}, {y:g}, {z:g}) lies {away:.3g} m off the garment; points are in metres")
     if cut.points:
@@ -147,7 +145,7 @@ def _paths(
     length = arc_lengths(drawn)
     if length[-1] == 0.0:
         raise InputError("all points of its line are one place; a line has two or more")
-    step = max(_STEP * float(np.linalg.norm(edge[:, 1] - edge[:, 0], axis=1).mean()), float(length[-1]) / _MOST_STEPS)
+    step = _STEP * float(np.linalg.norm(edge[:, 1] - edge[:, 0], axis=1).mean())
     # The corners of the line, and places between them.
     fine = [np.linspace(a, b, max(1, round(float(b - a) / step)), endpoint=False) for a, b in pairwise(length) if b > a]
     places = [_on(surface, point) for point in points_at_lengths(drawn, np.append(np.concatenate(fine), length[-1]))]
@@ -190,7 +188,7 @@ def _owners(surfaces: Sequence[Surface], rows: Sequence[Ids]) -> tuple[list[int]
             # It was joined to another one at its place.
             diagonal = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
             away, near = cKDTree(surface.vertices).query(surface.input_vertices[wanted[lost]])
-            place[lost] = np.where(away <= _SAME * diagonal, near, -1)
+            place[lost] = np.where(away <= SAME_PLACE * diagonal, near, -1)
         places.append(place)
     layers, found = list[int](), list[Ids]()
     for number in np.split(of_row.ravel(), np.cumsum([len(row) for row in rows])[:-1]):
@@ -204,23 +202,13 @@ def _owners(surfaces: Sequence[Surface], rows: Sequence[Ids]) -> tuple[list[int]
     return layers, found
 
 
-def _new_edges(cloth: Cloth, edges: Ids) -> Ids:
-    """Return edges (#E by 2, the lower vertex first) without those of the border and of seams, each once."""
-    he, stride = cloth.half_edges, np.int64(len(cloth.vertices))
-    taken = np.concatenate([he.edges[he.count == 1].astype(np.int64), cloth.seam_edges()])
-    edges = np.unique(edges, axis=0)
-    return edges[~np.isin(edges[:, 0] * stride + edges[:, 1], taken[:, 0] * stride + taken[:, 1])]
-
-
 def join_ends(cloth: Cloth) -> tuple[Cloth, list[str]]:
     """Return the cloth with drawn seams that end near a border or another seam carried on to it, or back, and notes on ends inside."""
-    size, notes = float(np.sqrt(cloth.face_areas.sum())), list[str]()
+    size, notes = cloth.size, list[str]()
     tried = set[tuple[float, ...]]()
     while True:
-        he = cloth.half_edges
-        border = he.edges[he.count == 1].astype(np.int64)
         vertices, degree = np.unique(cloth.seam_edges(), return_counts=True)
-        inside = vertices[(degree == 1) & ~np.isin(vertices, border)]
+        inside = vertices[(degree == 1) & ~np.isin(vertices, cloth.border_edges)]
         ends = [
             (tuple(cloth.vertices[vertex].tolist()), int(vertex), name)
             for name, edges in cloth.seams.items()
@@ -241,11 +229,11 @@ def join_ends(cloth: Cloth) -> tuple[Cloth, list[str]]:
             and np.linalg.norm(tip[:, 1] - tip[:, 0], axis=1).sum() <= _REACH * size
         ):
             # It was drawn a little too far.
-            rest = _without(cloth.seams[name], stub, len(cloth.vertices))
+            rest = cloth.seams[name][~are_among(cloth.seams[name], stub)]
             cloth = replace(cloth, seams={**cloth.seams, name: rest})
             continue
         lines = edge_components(cloth.seam_edges())
-        others = [border, *(line for line in lines if not (line == vertex).any())]
+        others = [cloth.border_edges, *(line for line in lines if not (line == vertex).any())]
         targets = np.concatenate(others)
         if not len(targets):
             continue
@@ -273,7 +261,7 @@ def leave_to_hand(cloth: Cloth, options: SeamOptions) -> tuple[Cloth, list[str]]
     drawn = {name: edges for name, edges in cloth.seams.items() if name.startswith(HAND)}
     if not drawn:
         return cloth, []
-    size, notes = float(np.sqrt(cloth.face_areas.sum())), list[str]()
+    size, notes = cloth.size, list[str]()
     every = np.concatenate(list(drawn.values()))
     ends = cloth.vertices[every]
     steps = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
@@ -286,7 +274,7 @@ def leave_to_hand(cloth: Cloth, options: SeamOptions) -> tuple[Cloth, list[str]]
     pieces = replace(cloth, seams=found).parts
     for name in found:
         kept = []
-        for line in edge_components(_without(found[name], every, len(cloth.vertices))):
+        for line in edge_components(found[name][~are_among(found[name], every)]):
             a, b = cloth.vertices[line].transpose(1, 0, 2)
             length = np.linalg.norm(b - a, axis=1)
             beside = float(length[tree.query(0.5 * (a + b))[0] <= BESIDE * size].sum()) >= _MOSTLY * float(length.sum())
@@ -311,18 +299,12 @@ def _parted_without(cloth: Cloth, name: str, line: Ids, pieces: Ids) -> bool:
         line: its edges (#E by 2).
         pieces: #F, the piece of each face that the seams would leave without those that are drawn.
     """
-    he, stride = cloth.half_edges, np.int64(len(cloth.vertices))
-    on_line = np.isin(he.edges[:, 0] * stride + he.edges[:, 1], line[:, 0] * stride + line[:, 1])
-    beside = np.unique(pieces[he.face[on_line[he.edge]]])
-    left = replace(cloth, seams={**cloth.seams, name: _without(cloth.seams[name], line, len(cloth.vertices))}).parts
+    he, seam = cloth.half_edges, cloth.seams[name]
+    beside = np.unique(pieces[he.face[are_among(he.edges, line)[he.edge]]])
+    left = replace(cloth, seams={**cloth.seams, name: seam[~are_among(seam, line)]}).parts
     # Most of each piece goes on in one of those that are left.
     most = [int(np.bincount(left[pieces == one], cloth.face_areas[pieces == one]).argmax()) for one in beside]
     return len(set(most)) == len(most)
-
-
-def _without(edges: Ids, others: Ids, count: int) -> Ids:
-    stride = np.int64(count)
-    return edges[~np.isin(edges[:, 0] * stride + edges[:, 1], others[:, 0] * stride + others[:, 1])]
 
 
 def keep_seams(cloth: Cloth, anatomy: Anatomy, options: SeamOptions) -> tuple[Cloth, list[str]]:
@@ -350,27 +332,18 @@ def keep_seams(cloth: Cloth, anatomy: Anatomy, options: SeamOptions) -> tuple[Cl
 
 def _kept(cloth: Cloth, anatomy: Anatomy, name: str, options: SeamOptions) -> Cloth | None:
     """Return the cloth with a centre line, a waist or a yoke; None where it has none."""
-    sleeve = cloth.labels.get("sleeve", np.full(len(cloth.faces), -1, dtype=np.int64))
-    cloth = replace(cloth, labels={**cloth.labels, "sleeve": sleeve})
-    trunk = sleeve < 0
+    cloth = cloth.with_labels(sleeve=cloth.labels.get("sleeve", np.full(len(cloth.faces), -1, dtype=np.int64)))
     if name in ("centre front", "centre back") and LEFT in cloth.values:
-        cloth = tidied(cloth, LEFT, trunk)
-        cloth, is_left = cloth.split(LEFT, trunk)
-        edges = cloth.line_between(is_left, cloth.labels["sleeve"] < 0)
-        ahead = cloth.values[FACING][edges].mean(axis=1) > 0.0
-        edges = edges[ahead if name == "centre front" else ~ahead]
+        cloth, lines = centre_lines(cloth)
+        edges = lines[name]
     elif name in ("waist", "yoke"):
         level = level_of(cloth, anatomy, name, options)
         if level is None:
             return None
-        height = cloth.vertices @ anatomy.up - level
-        cloth = tidied(replace(cloth, values={**cloth.values, "level": height}), "level", trunk)
-        cloth, above = cloth.split("level", trunk)
-        edges = cloth.line_between(above, cloth.labels["sleeve"] < 0)
-        cloth = replace(cloth, values={key: value for key, value in cloth.values.items() if key != "level"})
+        cloth, _, _, edges = cloth.parted(cloth.vertices @ anatomy.up - level, cloth.labels["sleeve"] < 0)
     else:
         return None
-    edges = _new_edges(cloth, np.sort(edges, axis=1))
+    edges = cloth.new_edges(edges)
     return cloth.with_seam(name, edges) if len(edges) else None
 
 
@@ -382,17 +355,17 @@ def level_of(cloth: Cloth, anatomy: Anatomy, name: str, options: SeamOptions) ->
     forks = {kind: [float(limb.fork @ anatomy.up) for limb in anatomy.limbs_of(kind)] for kind in ("sleeve", "leg")}
     low, high = float(own.min()), float(own.max())
     if name == "yoke":
-        if anatomy.kind not in ("top", "dress", "skirt", "trousers", "jumpsuit"):
+        if anatomy.kind not in TAILORED:
             return None
         bottom = max(forks["sleeve"] or forks["leg"] or [0.5 * (low + high)])
         return high - _YOKE * (high - bottom)
-    if anatomy.kind not in ("top", "dress", "jumpsuit"):
+    if anatomy.kind not in FROM_SHOULDERS:
         return None
     waist = options.waist_along(anatomy.up)
     if waist is not None and low < waist < high:
         return waist
     top = min(forks["sleeve"] or [high])
     bottom = max(forks["leg"] or [top - 0.75 * min(top - low, anatomy.size)])
-    levels = np.linspace(top - 0.15 * (top - bottom), bottom + 0.15 * (top - bottom), _LEVELS)
+    levels = np.linspace(top - 0.15 * (top - bottom), bottom + 0.15 * (top - bottom), LEVELS)
     girths = [section(cloth, heights - level, trunk)[0] for level in levels]
     return float(levels[int(np.argmin(girths))])

@@ -10,25 +10,28 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core import BoolArray, FloatArray, project_on_segments
-from warpflat.flat import (
-    HalfEdges,
-    Surface,
-    SurfacePath,
-    border_loops,
-    components,
-    face_normals,
-    flat_areas,
-    half_edges,
-    join_labels,
-    split_faces_along,
-)
+from warpflat.flat import SurfacePath, are_joined, components, half_edges, join_labels, split_faces_along
+from warpflat.garment.seams.fields import TriangleMesh
 
-__all__ = ["Cloth", "PieceMesh", "edge_components", "section"]
+__all__ = [
+    "ALIKE",
+    "BESIDE_LINE",
+    "FACES",
+    "ISLAND",
+    "LEVELS",
+    "SAME_WAY",
+    "Cloth",
+    "PieceMesh",
+    "are_among",
+    "edge_components",
+    "section",
+]
 
 Ids = NDArray[np.int64]
 
@@ -36,20 +39,28 @@ Ids = NDArray[np.int64]
 _NEAR = 0.2
 # A line keeps this share of an edge away from a vertex that must stay: no needles arise.
 _CLEAR = 0.04
+#: Pieces, and seams, are alike if what is measured of them agrees within this share.
+ALIKE = 0.015
+#: Directions are the same from this cosine on, and cloth faces a direction from the second on: within 60 degrees.
+SAME_WAY, FACES = 0.97, 0.5
+#: Cloth within this share of the size is beside a line: what moves with the line fades over it.
+BESIDE_LINE = 0.05
+#: Girths, and how far cloth reaches, are measured at so many heights.
+LEVELS = 32
+#: An island of the other sign of less than this share of its part is a wrinkle.
+ISLAND = 0.06
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PieceMesh:
+class PieceMesh(TriangleMesh):
     """One piece that the seams leave: its mesh, and where each vertex and face was before."""
 
-    vertices: FloatArray
-    faces: Ids
     vertex_of: Ids
     face_of: Ids
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Cloth:
+class Cloth(TriangleMesh):
     """Triangles with values at their vertices, labels of their faces, and the edges along which they are cut.
 
     Attributes:
@@ -60,32 +71,19 @@ class Cloth:
         seams: edges by the name of their seam, #E by 2.
     """
 
-    vertices: FloatArray
-    faces: Ids
     values: Mapping[str, FloatArray] = field(default_factory=dict)
     labels: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
     seams: Mapping[str, Ids] = field(default_factory=dict)
-
-    @cached_property
-    def half_edges(self) -> HalfEdges:
-        """The half-edges of the faces."""
-        return half_edges(self.faces.astype(np.int32))
-
-    @cached_property
-    def face_areas(self) -> FloatArray:
-        """#F [m2]."""
-        return flat_areas(self.vertices, self.faces)
-
-    @property
-    def face_normals(self) -> FloatArray:
-        """#F by 3, of length 1, or 0 for a face without area."""
-        return face_normals(self.vertices, self.faces)
 
     def seam_edges(self) -> Ids:
         """#E by 2, the edges of all seams, the lower vertex first, each once."""
         if not self.seams:
             return np.empty((0, 2), dtype=np.int64)
         return np.unique(np.sort(np.concatenate(list(self.seams.values())), axis=1), axis=0)
+
+    def new_edges(self, edges: Ids) -> Ids:
+        """Return those of some edges (#E by 2) that are of no seam, and not at the border."""
+        return edges[~(are_among(edges, self.border_edges) | are_among(edges, self.seam_edges()))]
 
     def with_seam(self, name: str, edges: Ids) -> Cloth:
         """Return the cloth with edges added to a seam."""
@@ -102,7 +100,72 @@ class Cloth:
         """Return the cloth with a seam closed again."""
         return replace(self, seams={key: edges for key, edges in self.seams.items() if key != name})
 
-    def split(self, level: str, within: BoolArray) -> tuple[Cloth, BoolArray]:
+    def with_values(self, **values: FloatArray | None) -> Cloth:
+        """Return the cloth with other fields; one that is None is left out."""
+        every = {**self.values, **values}
+        return replace(self, values={name: value for name, value in every.items() if value is not None})
+
+    def with_labels(self, **labels: Ids | None) -> Cloth:
+        """Return the cloth with other labels; one that is None is left out."""
+        every = {**self.labels, **labels}
+        return replace(self, labels={name: label for name, label in every.items() if label is not None})
+
+    def only(self, faces: BoolArray) -> Cloth:
+        """Return some of the faces (#F) alone, with the vertices that they use, and what of the seams runs along them."""
+        used, place = np.unique(self.faces[faces], return_inverse=True)
+        number = np.full(len(self.vertices), -1, dtype=np.int64)
+        number[used] = np.arange(len(used))
+        made = Cloth(
+            vertices=self.vertices[used],
+            faces=place.reshape(-1, 3).astype(np.int64),
+            values={name: value[used] for name, value in self.values.items()},
+            labels={name: label[faces] for name, label in self.labels.items()},
+        )
+        seams = {name: np.sort(number[edges], axis=1) for name, edges in self.seams.items()}
+        kept = {name: edges[are_among(edges, made.half_edges.edges)] for name, edges in seams.items()}
+        return replace(made, seams=kept)
+
+    def sleeve_of(self, mesh: PieceMesh) -> int:
+        """Return the number of the sleeve, or of the hood behind the last one, of which a piece is; -1 for the trunk."""
+        return int(np.median(self.labels["sleeve"][mesh.face_of])) if "sleeve" in self.labels else -1
+
+    def parted(self, level: str | FloatArray, within: BoolArray, *, keep: float = ISLAND) -> Parted:
+        """Split the faces of a region along the zero line of a field without its islands.
+
+        Args:
+            level: the name of a field, or one (#V) that is needed for this line alone.
+            within: #F, the region.
+            keep: share of the region's area from which a part of one sign is no island.
+        """
+        name = level if isinstance(level, str) else "line"
+        cloth = self if isinstance(level, str) else self.with_values(line=level)
+        cloth, positive, within = cloth.without_islands(name, within, keep=keep).split(name, within)
+        edges = cloth.line_between(positive, within)
+        return Parted(cloth if isinstance(level, str) else cloth.with_values(line=None), positive, within, edges)
+
+    def without_islands(self, level: str, within: BoolArray, *, keep: float = ISLAND) -> Cloth:
+        """Return the cloth with islands of the other sign removed from a field: small parts of what they lie in.
+
+        Args:
+            level: its name.
+            within: #F, the faces in which islands are looked for.
+            keep: share of their area from which a part is no island.
+        """
+        f, faces = self.values[level], self.faces[within]
+        if len(faces) == 0:
+            return self
+        mass = np.bincount(faces.ravel(), np.repeat(self.face_areas[within], 3), minlength=len(f)) / 3.0
+        used = mass > 0.0
+        label = TriangleMesh(vertices=self.vertices, faces=faces).connected(lambda a, b: (f[a] > 0.0) == (f[b] > 0.0))
+        small = used & (np.bincount(label, mass)[label] < keep * mass.sum())
+        if not small.any():
+            return self
+        scale = 1e-2 * float(np.abs(f[used]).max())
+        made = f.copy()
+        made[small] = np.where(f[small] > 0.0, -1.0, 1.0) * np.minimum(np.abs(f[small]), scale)
+        return self.with_values(**{level: made})
+
+    def split(self, level: str, within: BoolArray) -> tuple[Cloth, BoolArray, BoolArray]:
         """Split faces along the zero line of a field.
 
         Args:
@@ -110,7 +173,7 @@ class Cloth:
             within: #F, the faces that are split; neighbours follow where a shared edge is.
 
         Returns:
-            The cloth, and #F, true for the faces in which the field is positive.
+            The cloth; #F, true for the faces in which the field is positive; and #F, true for those that were within.
         """
         cloth = self._snapped(level, within)
         f, faces, count = cloth.values[level], cloth.faces, len(cloth.vertices)
@@ -175,7 +238,7 @@ class Cloth:
             labels={name: label[parent] for name, label in cloth.labels.items()},
             seams=seams,
         )
-        return made, values[level][split].sum(axis=1) > 0.0
+        return made, values[level][split].sum(axis=1) > 0.0, within[parent]
 
     def _snapped(self, level: str, within: BoolArray) -> Cloth:
         """Return the cloth with vertices that the zero line passes closely moved onto it."""
@@ -183,14 +246,9 @@ class Cloth:
         # A line that passes a vertex within rounding passes through it: a sliver beside it would have no area.
         f[np.abs(f) <= 1e-9 * np.abs(f[self.faces[within]]).max(initial=0.0)] = 0.0
         he = self.half_edges
-        edges, count = he.edges.astype(np.int64), he.count
+        edges = he.edges.astype(np.int64)
         held = np.zeros(len(f), dtype=bool)
-        on_border = count == 1
-        fixed = np.zeros(len(edges), dtype=bool)
-        fixed[on_border] = True
-        if len(seam := self.seam_edges()):
-            stride = len(f)
-            fixed |= np.isin(edges[:, 0] * stride + edges[:, 1], seam[:, 0] * stride + seam[:, 1])
+        fixed = (he.count == 1) | are_among(edges, self.seam_edges())
         held[edges[fixed]] = True
         inside = np.zeros(len(edges), dtype=bool)
         inside[he.edge[within[he.face]]] = True
@@ -228,14 +286,6 @@ class Cloth:
         vertices[taken] += weight[:, None] * (self.vertices[other[row]] - self.vertices[taken])
         return replace(self, vertices=vertices, values=values)
 
-    def as_surface(self) -> Surface:
-        """Return the cloth as a surface, without its seams."""
-        return Surface(
-            vertices=self.vertices,
-            faces=np.column_stack([self.faces, np.full(len(self.faces), -1)]).astype(np.int32),
-            name="garment",
-        )
-
     def drawn(self, path: SurfacePath) -> tuple[Cloth, Ids]:
         """Draw a path over the cloth, along edges.
 
@@ -267,8 +317,7 @@ class Cloth:
                 for name, own in pieces.items()
             },
         )
-        he = made.half_edges
-        held = np.union1d(he.edges[he.count == 1], made.seam_edges())
+        held = np.union1d(made.border_edges, made.seam_edges())
         row = split.path.astype(np.int64)
         free = np.setdiff1d(row[1:-1] if row[0] != row[-1] else row, held)
         if len(free):
@@ -278,10 +327,7 @@ class Cloth:
             at = share[np.arange(len(free)), best][:, None]
             made.vertices[free] = (1.0 - at) * along[best] + at * along[best + 1]
         edges = np.unique(np.sort(np.stack([row[:-1], row[1:]], axis=1), axis=1), axis=0)
-        stride = np.int64(len(made.vertices))
-        taken = np.concatenate([he.edges[he.count == 1].astype(np.int64), made.seam_edges()])
-        new = ~np.isin(edges[:, 0] * stride + edges[:, 1], taken[:, 0] * stride + taken[:, 1])
-        return made, edges[new]
+        return made, made.new_edges(edges)
 
     def line_between(self, sides: NDArray[np.generic], within: BoolArray) -> Ids:
         """Return the edges (#E by 2) between faces of different sides (#F), both of them in `within` (#F)."""
@@ -305,15 +351,12 @@ class Cloth:
             among: #F, only those pieces that have some of these faces; all if not given.
         """
         part, seam = self.parts, self.seam_edges()
-        stride = np.int64(len(self.vertices))
-        cut = seam[:, 0] * stride + seam[:, 1]
         for number in np.unique(part if among is None else part[among]).tolist():
             chosen = np.flatnonzero(part == number)
             faces = self.faces[chosen]
             # Corners at a vertex are one vertex where faces share an edge there that is not cut.
             he = half_edges(faces.astype(np.int32))
-            keys = he.edges[:, 0].astype(np.int64) * stride + he.edges[:, 1]
-            inner = np.flatnonzero((he.count[he.edge] == 2) & ~np.isin(keys, cut)[he.edge])
+            inner = np.flatnonzero((he.count[he.edge] == 2) & ~are_among(he.edges, seam)[he.edge])
             pair = inner[np.argsort(he.edge[inner], kind="stable")].reshape(-1, 2)
             a, b = pair.T
             fan = join_labels(len(he.tail), np.concatenate([a, he.next[a]]), np.concatenate([he.next[b], b]))
@@ -326,12 +369,26 @@ class Cloth:
                 face_of=chosen,
             )
 
-    def borders(self, faces: BoolArray | None = None) -> list[Ids]:
-        """Return the border loops of the cloth, or of some of its faces (#F), the longest first."""
-        chosen = self.faces if faces is None else self.faces[faces]
-        if len(chosen) == 0:
-            return []
-        return [loop.astype(np.int64) for loop in border_loops(chosen.astype(np.int32), self.vertices)]
+
+class Parted(NamedTuple):
+    """A cloth that was split along the zero line of a field.
+
+    Attributes:
+        cloth: split.
+        positive: #F, where the field is positive.
+        within: #F, the region in which it was split.
+        edges: #E by 2, the line.
+    """
+
+    cloth: Cloth
+    positive: BoolArray
+    within: BoolArray
+    edges: Ids
+
+
+def are_among(edges: NDArray[np.integer], others: NDArray[np.integer]) -> BoolArray:
+    """Return #E, whether edges (#E by 2) are among others (#O by 2), whichever vertex is named first."""
+    return are_joined(np.unique(np.sort(others, axis=1), axis=0), *edges.T)
 
 
 def edge_components(edges: Ids, *, ends: Ids | None = None) -> list[Ids]:

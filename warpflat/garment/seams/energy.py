@@ -13,26 +13,32 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, FloatArray, InputError, find_unused_name, report_activity, two_at_a_time
-from warpflat.flat import Fabric, Flattening, Surface, components
+from warpflat.core import (
+    BoolArray,
+    FloatArray,
+    InputError,
+    find_unused_name,
+    other_side,
+    report_activity,
+    two_at_a_time,
+)
+from warpflat.flat import LEAST_MOUTH, TRIED, Fabric, Flattening, Surface, components
 from warpflat.garment.seams.anatomy import Anatomy
-from warpflat.garment.seams.cloth import Cloth, PieceMesh, edge_components
-from warpflat.garment.seams.lines import MOUTH, WAIST, WIDE, Line, Offer, first_of_equals, offers
+from warpflat.garment.seams.cloth import ALIKE, Cloth, PieceMesh, edge_components
+from warpflat.garment.seams.lines import APART, WAIST, WIDE, Line, Offer, first_of_equals, offers
 from warpflat.garment.seams.measure import (
     OWNER,
     PRICE_LEFT,
     TRIAL_LEFT,
     Measure,
     Measured,
-    is_disk,
     least_width,
     measured,
     remembered,
     without_memory,
 )
 from warpflat.garment.seams.options import SeamOptions
-from warpflat.garment.seams.solid import NARROW, SEWABLE, SOLID, parts_within
-from warpflat.garment.seams.symmetric import other_side
+from warpflat.garment.seams.solid import NARROW, OVERLAP, SEWABLE, SOLID, parts_within
 from warpflat.garment.seams.tailor import side_word
 
 __all__ = ["Trial", "cut_by_energy"]
@@ -42,23 +48,15 @@ Ids = NDArray[np.int64]
 # A dart or a seam is made if it brings this share of the whole garment's cloth back within its limits; before seams are looked for, too,
 # a dart brings this share of what is beyond in its piece: a small one first would be in the way of a seam.
 _WORTH, _WORTH_ALONE = 0.002, 0.15
-# Darts alone do not do where more than this share stays beyond the limits.
-_PARTED = 0.015
-# So many offers are tried in a round.
-_TRIALS = 3
-# What lies over itself by no more than this does not [m2].
-_OVERLAP = 1e-5
 # What hangs by a neck of so many times what can be sewn hangs by less once it is sewn.
 _HARDLY = 1.5
-# A seam costs nothing if closing it brings no more than this share of the garment's cloth beyond the limit, and no more strain energy than
-# this share of all, and this much [J/m2].
-_NOTHING, _NO_ENERGY, _NO_DENSITY = 1.5e-3, 0.02, 1e-2
-# Seams of a closed thing are alike if their lengths agree within this share.
-_EQUAL = 0.015
+# A seam costs nothing if closing it brings no more cloth beyond the limit than one that is made must bring back, and no more strain energy
+# than this share of all, and this much [J/m2].
+_NO_ENERGY, _NO_DENSITY = 0.02, 1e-2
+# So many pieces a tailor cuts at most.
+_USUAL = {"top": 6, "dress": 6, "skirt": 4, "trousers": 4, "jumpsuit": 12, "sleeve": 2}
 # Seams that a garment keeps even so: it is put together at them. A leg can do without a side seam, a trunk cannot.
 _STRUCTURAL = ("armhole", "inseam", "shoulder", "underarm", "side")
-# A waist is cut through pieces that reach farther than this share of the size above and below it.
-_BESIDE_WAIST = 0.04
 # Names of a seam on trial, and of its mirror image.
 _TRIAL, _MATE = "on trial", "on trial, mirrored"
 
@@ -103,7 +101,9 @@ def cut_by_energy(
     cloth, pieces, trials = _closed_for_nothing(cloth, pieces, anatomy, options, measure)
     # Who asks for less beyond the limit than is usual takes what brings less.
     least = _WORTH * min(options.limit / SeamOptions.limit, 1.0) * total
-    most = options.most_pieces if options.most_pieces is not None else _usual_pieces(cloth, anatomy, len(pieces))
+    # Two more pieces for a hood, and two in the sleeves of what opens in front.
+    usual = max(len(pieces), _USUAL.get(anatomy.kind, 8)) + 2 * (("hood" in cloth.seams) + anatomy.open_front)
+    most = usual if options.most_pieces is None else options.most_pieces
     # What is laid out stays as it is until it is cut.
     known = dict[Flattening, list[Offer]]()
     parting = False
@@ -121,7 +121,7 @@ def cut_by_energy(
         tried = 0
         # Offers are tried in the order of their prices. Most promise more than they hold, so the first that is worth more than the
         # promise of the next is the best. What was tried is known by its worth from then on, and forgotten if it cannot be made.
-        while best is None or tried < _TRIALS:
+        while best is None or tried < TRIED:
             waiting = [
                 (number, offer)
                 for number in twins
@@ -151,12 +151,12 @@ def cut_by_energy(
             if gain >= floor[number]:
                 left.append(replace(offer, gain=gain))
                 if best is None or left[-1].value > best[0]:
-                    side = (
-                        offer.line.beside(anatomy) if twins[number] is None else _side_of(pieces[number].mesh, anatomy)
-                    )
+                    side = offer.line.beside(anatomy)
+                    if twins[number] is not None:
+                        side = float(anatomy.across(pieces[number].mesh.vertices).mean())
                     best = left[-1].value, offer.line, side, made, new
         if best is None:
-            if parting or beyond <= min(_PARTED, options.limit) * total:
+            if parting:
                 break
             # Darts alone do not do.
             parting, known = True, {}
@@ -167,7 +167,7 @@ def cut_by_energy(
             if name in cloth.seams:
                 word = f" {side_word(sign * side)}" if _MATE in best[3].seams else ""
                 names.append(find_unused_name(f"{line.name}{word}", cloth.seams))
-                cloth = _renamed(cloth, name, names[-1])
+                cloth = cloth.without_seam(name).with_seam(names[-1], cloth.seams[name])
         old, pieces = pieces, measure(cloth, [*pieces, *new])
         gain = (beyond - sum(one.outside for one in pieces)) / total
         released = sum(one.energy for one in old) - sum(one.energy for one in pieces)
@@ -223,7 +223,7 @@ def _closed_for_nothing(
             # What lies between equal pieces: they stay equal, and are drawn once.
             long = cloth.seam_length(name)
             alike = [one for one in cloth.seams if one.startswith(SOLID) and one != name]
-            return [name, *(one for one in alike if abs(cloth.seam_length(one) - long) < _EQUAL * long)]
+            return [name, *(one for one in alike if abs(cloth.seam_length(one) - long) < ALIKE * long)]
         mate = other_side(name)
         return [name, mate] if mate != name and mate in cloth.seams else [name]
 
@@ -253,7 +253,7 @@ def _closed_for_nothing(
             most = np.inf if name.startswith(SOLID) else _NO_ENERGY * energy + _NO_DENSITY * area
             of_leg = name.startswith("side") and anatomy.kind == "trousers"
             kept = (name.startswith(_STRUCTURAL) and not of_leg) or any(options.keeps(one) for one in both)
-            if kept or trial.released is None or trial.outside > _NOTHING or trial.released > most:
+            if kept or trial.released is None or trial.outside > _WORTH or trial.released > most:
                 continue
             # Before it is closed, it is known well: the layout of what is joined is far from rest.
             trial, new = price(both, energy_left=TRIAL_LEFT)
@@ -262,7 +262,7 @@ def _closed_for_nothing(
                 trial.released is None
                 or least_width(new, anatomy.size) < least_width(pieces, anatomy.size)
                 or trial.released > len(both) * most
-                or now > max(outside + _NOTHING * area, options.limit * area)
+                or now > max(outside + _WORTH * area, options.limit * area)
             ):
                 continue
             for one in both:
@@ -303,7 +303,7 @@ def _without(
         after = measure(closed, pieces, changed=joined, energy_left=energy_left)
     except InputError:
         return replace(needed, needed="cannot lie flat without it"), []
-    if sum(one.result.overlap for one in after) > sum(one.result.overlap for one in before) + _OVERLAP:
+    if sum(one.result.overlap for one in after) > sum(one.result.overlap for one in before) + OVERLAP:
         return replace(needed, needed="lies over itself without it"), []
     released = sum(one.energy for one in after) - sum(one.energy for one in before)
     total = sum(one.area for one in pieces)
@@ -322,13 +322,7 @@ def _closed(cloth: Cloth, names: Sequence[str]) -> tuple[Cloth, set[int]]:
 def _opens_a_tube(cloth: Cloth, names: Sequence[str]) -> bool:
     """Return whether the cloth without seams has a piece that is no disk."""
     closed, joined = _closed(cloth, names)
-    return not all(is_disk(mesh.faces) for mesh in closed.pieces(np.isin(cloth.labels[OWNER], list(joined))))
-
-
-def _usual_pieces(cloth: Cloth, anatomy: Anatomy, now: int) -> int:
-    """Return how many pieces a tailor would cut at most: two more for a hood, and two in the sleeves of what opens in front."""
-    usual = {"top": 6, "dress": 6, "skirt": 4, "trousers": 4, "jumpsuit": 12, "sleeve": 2}.get(anatomy.kind, 8)
-    return max(now, usual) + 2 * (("hood" in cloth.seams) + anatomy.open_front)
+    return not all(mesh.is_disk for mesh in closed.pieces(np.isin(cloth.labels[OWNER], list(joined))))
 
 
 def _can_be_sewn(cloth: Cloth, line: Line, before: Sequence[Measured], after: Sequence[Measured], size: float) -> bool:
@@ -336,7 +330,7 @@ def _can_be_sewn(cloth: Cloth, line: Line, before: Sequence[Measured], after: Se
 
     Beside a dart's mouth its piece is narrow, and may be: what counts is that it hangs together around the tip.
     """
-    if sum(piece.result.overlap for piece in after) > sum(piece.result.overlap for piece in before) + _OVERLAP:
+    if sum(piece.result.overlap for piece in after) > sum(piece.result.overlap for piece in before) + OVERLAP:
         return False
     if line.parts:
         return least_width(after, size) >= least_width(before, size)
@@ -357,11 +351,7 @@ def _can_be_sewn(cloth: Cloth, line: Line, before: Sequence[Measured], after: Se
         if len(twice):
             gap = piece.result.positions[order[twice]] - piece.result.positions[order[twice + 1]]
             widest = max(widest, float(np.linalg.norm(gap, axis=1).max()))
-    return MOUTH <= widest <= WIDE * cloth.seam_length(_TRIAL)
-
-
-def _side_of(mesh: PieceMesh, anatomy: Anatomy) -> int:
-    return 1 if float((mesh.vertices @ anatomy.normal).mean()) - anatomy.offset > 0.0 else -1
+    return LEAST_MOUTH <= widest <= WIDE * cloth.seam_length(_TRIAL)
 
 
 def _twin(number: int, pieces: Sequence[Measured], anatomy: Anatomy) -> int | None:
@@ -369,7 +359,7 @@ def _twin(number: int, pieces: Sequence[Measured], anatomy: Anatomy) -> int | No
     if anatomy.mirror is None:
         return None
     middles = np.array([one.mesh.vertices[one.mesh.faces].mean(axis=(0, 1)) for one in pieces])
-    across = float(middles[number] @ anatomy.normal) - anatomy.offset
+    across = float(anatomy.across(middles[number]))
     away = np.linalg.norm(middles - anatomy.image(middles[number]), axis=1)
     away[number] = np.inf
     nearest = int(away.argmin())
@@ -380,12 +370,11 @@ def _twin(number: int, pieces: Sequence[Measured], anatomy: Anatomy) -> int | No
 
 def _across(cloth: Cloth, among: BoolArray, line: Line, anatomy: Anatomy) -> list[PieceMesh]:
     """Return the pieces of the trunk with some of these faces (#F) that a plane parts well inside."""
-    sleeve = cloth.labels.get("sleeve", np.full(len(cloth.faces), -1))
-    beside = _BESIDE_WAIST * anatomy.size
+    beside = APART * anatomy.size
     found = []
     for mesh in cloth.pieces(among):
         height = (mesh.vertices - line.point) @ line.normal
-        if np.median(sleeve[mesh.face_of]) < 0 and height.min() < -beside and height.max() > beside:
+        if cloth.sleeve_of(mesh) < 0 and height.min() < -beside and height.max() > beside:
             found.append(mesh)
     return found
 
@@ -395,10 +384,9 @@ def _cut(cloth: Cloth, mesh: PieceMesh, line: Line, name: str) -> Cloth | None:
 
     A dart begins at the border of the piece and ends inside; a seam parts the piece in two.
     """
-    own = np.zeros(len(cloth.faces), dtype=bool)
-    own[mesh.face_of] = True
+    own = np.isin(np.arange(len(cloth.faces)), mesh.face_of)
     field = line.field(cloth)
-    cloth = replace(cloth, values={**cloth.values, "trial": field})
+    cloth = cloth.with_values(trial=field)
     if line.start is not None and line.end is not None:
         way = line.end - line.start
         along = (cloth.vertices - line.start) @ way / float(way @ way)
@@ -409,38 +397,21 @@ def _cut(cloth: Cloth, mesh: PieceMesh, line: Line, name: str) -> Cloth | None:
         # The tip lies where it is meant to, not where the next edge is: on both sides of a garment alike.
         corners = field[cloth.faces]
         through = reached & (corners.min(axis=1) < 0.0) & (corners.max(axis=1) > 0.0)
-        cloth = replace(
-            cloth,
-            values={**cloth.values, "tip": along - 1.0},
-            labels={**cloth.labels, "own": reached.astype(np.int64)},
-        )
-        cloth, beyond = cloth.split("tip", through)
+        cloth = cloth.with_values(tip=along - 1.0).with_labels(own=reached.astype(np.int64))
+        cloth, beyond, _ = cloth.split("tip", through)
         own = (cloth.labels["own"] > 0) & ~beyond
-    labels = {**cloth.labels, "own": own.astype(np.int64)}
-    made, positive = replace(cloth, labels=labels).split("trial", own)
-    within = made.labels["own"] > 0
-    lines = made.line_between(positive, within)
-    if len(lines) == 0:
+    made, positive, within = cloth.split("trial", own)
+    made = made.with_values(trial=None, tip=None).with_labels(own=None)
+    lines = edge_components(made.new_edges(made.line_between(positive, within)))
+    if not lines:
         return None
-    before = {tuple(edge) for edge in made.seam_edges().tolist()}
-    lines = np.array([edge for edge in lines.tolist() if tuple(edge) not in before], dtype=np.int64).reshape(-1, 2)
-    if len(lines) == 0:
+    longest = max(lines, key=len)
+    vertices, counts = np.unique(longest, return_counts=True)
+    border = np.union1d(made.border_edges, made.seam_edges())
+    at_border = np.isin(vertices[counts == 1], border)
+    if (counts > 2).any() or len(at_border) != 2 or np.isin(vertices[counts == 2], border).any():
         return None
-    he = made.half_edges
-    outside = set(np.unique(he.edges[he.count == 1]).tolist()) | set(np.unique(made.seam_edges()).tolist())
-    for part in sorted(edge_components(lines), key=len, reverse=True)[:1]:
-        vertices, counts = np.unique(part, return_counts=True)
-        ends = vertices[counts == 1]
-        if (counts > 2).any() or len(ends) != 2:
-            return None
-        at_border = [int(v) in outside for v in ends]
-        inner = vertices[counts == 2]
-        if any(int(v) in outside for v in inner) or sum(at_border) != (2 if line.parts else 1):
-            return None
-        kept = {key: value for key, value in made.values.items() if key not in ("trial", "tip")}
-        marks = {key: label for key, label in made.labels.items() if key != "own"}
-        return replace(made, values=kept, labels=marks).with_seam(name, part)
-    return None
+    return made.with_seam(name, longest) if at_border.sum() == (2 if line.parts else 1) else None
 
 
 def _reached_within(cloth: Cloth, allowed: BoolArray, start: FloatArray) -> BoolArray:
@@ -454,7 +425,3 @@ def _reached_within(cloth: Cloth, allowed: BoolArray, start: FloatArray) -> Bool
     first = int(np.linalg.norm(middle - start, axis=1).argmin())
     found[chosen[part == part[first]]] = True
     return found
-
-
-def _renamed(cloth: Cloth, old: str, new: str) -> Cloth:
-    return replace(cloth, seams={new if key == old else key: edges for key, edges in cloth.seams.items()})

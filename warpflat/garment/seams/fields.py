@@ -1,18 +1,33 @@
-"""Smooth fields on a garment: harmonic and heat fields, and the mirror image of a field."""
+"""A triangle mesh and what follows from it; smooth fields on it, harmonic and of heat; and the mirror image of a field."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, csr_array, diags_array
 
-from warpflat.core import FloatArray, factor_symmetric, reflected
-from warpflat.flat import face_normals, flat_areas, nearest_on_triangles, vertex_normals
+from warpflat.core import BoolArray, FloatArray, factor_symmetric, reflected, unit
+from warpflat.flat import (
+    HalfEdges,
+    Surface,
+    area_vectors,
+    border_loops,
+    euler_characteristic,
+    flat_areas,
+    half_edges,
+    join_labels,
+    mean_normals,
+    nearest_on_triangles,
+)
 
-__all__ = ["MirrorMap", "Operators", "mirror_map"]
+__all__ = ["MirrorMap", "TriangleMesh", "mirror_map"]
+
+Ids = NDArray[np.int64]
 
 # Cotangents of needles are bounded: they would drown all others.
 _MOST_COTANGENT = 20.0
@@ -23,8 +38,8 @@ _TRIED = 12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Operators:
-    """Laplacian and mass of a triangle mesh.
+class TriangleMesh:
+    """A triangle mesh, and what follows from it, each made when it is first asked for.
 
     Attributes:
         vertices: #V by 3 [m].
@@ -32,7 +47,89 @@ class Operators:
     """
 
     vertices: FloatArray
-    faces: NDArray[np.int64]
+    faces: Ids
+
+    @cached_property
+    def half_edges(self) -> HalfEdges:
+        """The half-edges of the faces."""
+        return half_edges(self.faces.astype(np.int32))
+
+    @cached_property
+    def border_edges(self) -> Ids:
+        """#E by 2, the edges with a face on one side alone."""
+        return self.half_edges.edges[self.half_edges.count == 1].astype(np.int64)
+
+    @cached_property
+    def loops(self) -> list[Ids]:
+        """The border loops, the longest first."""
+        return [loop.astype(np.int64) for loop in border_loops(self.half_edges, self.vertices)]
+
+    @cached_property
+    def shape(self) -> tuple[int, int]:
+        """The number of border loops, and the Euler characteristic: (1, 1) of a disk, (2, 0) of a tube or a ring."""
+        return len(self.loops), euler_characteristic(self.half_edges)
+
+    @property
+    def is_disk(self) -> bool:
+        """Whether it is one disk."""
+        return self.shape == (1, 1)
+
+    @cached_property
+    def area_vectors(self) -> FloatArray:
+        """#F by 3, normals as long as the areas [m2]."""
+        return area_vectors(self.vertices, self.faces)
+
+    @cached_property
+    def face_areas(self) -> FloatArray:
+        """#F [m2]."""
+        return flat_areas(self.vertices, self.faces)
+
+    @cached_property
+    def face_normals(self) -> FloatArray:
+        """#F by 3, of length 1, or 0 for a face without area."""
+        return unit(self.area_vectors)
+
+    @cached_property
+    def size(self) -> float:
+        """The square root of the area [m], of which most lengths are shares."""
+        return float(np.sqrt(self.face_areas.sum()))
+
+    @cached_property
+    def vertex_normals(self) -> FloatArray:
+        """#V by 3, of length 1."""
+        return mean_normals(self.area_vectors, self.faces, len(self.vertices))
+
+    @cached_property
+    def curvature(self) -> FloatArray:
+        """#V, by how much the angles of the faces around a vertex fall short of 2 pi, of pi at the border [rad]."""
+        return np.array(trimesh.Trimesh(self.vertices, self.faces, process=False).vertex_defects)
+
+    @cached_property
+    def graph(self) -> csr_array:
+        """#V by #V, the lengths of the edges [m], each from its lower vertex to the higher one."""
+        a, b = self.half_edges.edges.T.astype(np.int64)
+        # A length of nothing would be read as "no edge".
+        long = np.maximum(np.linalg.norm(self.vertices[a] - self.vertices[b], axis=1), 1e-12)
+        return csr_array(coo_array((long, (a, b)), shape=(len(self.vertices),) * 2))
+
+    def as_surface(self, name: str = "garment") -> Surface:
+        """Return the mesh as a surface of a name."""
+        return Surface(
+            vertices=self.vertices,
+            faces=np.column_stack([self.faces, np.full(len(self.faces), -1)]).astype(np.int32),
+            name=name,
+        )
+
+    def connected(self, joined: Callable[[Ids, Ids], BoolArray]) -> Ids:
+        """Return #V, a number for each set of vertices that edges hold together of which `joined` (#E) is true for both ends."""
+        a, b = self.half_edges.edges.T.astype(np.int64)
+        kept = joined(a, b)
+        return join_labels(len(self.vertices), a[kept], b[kept]).astype(np.int64)
+
+    def reached(self, allowed: BoolArray, seeds: Ids) -> BoolArray:
+        """Return #V, the vertices that are reached from seeds along edges between allowed ones (#V)."""
+        label = self.connected(lambda a, b: allowed[a] & allowed[b])
+        return np.asarray(np.isin(label, label[seeds[allowed[seeds]]]) & allowed)
 
     @cached_property
     def laplacian(self) -> csr_array:
@@ -58,23 +155,8 @@ class Operators:
     @cached_property
     def mass(self) -> FloatArray:
         """#V, the area of each vertex [m2]."""
-        area = flat_areas(self.vertices, self.faces) / 3.0
-        return np.maximum(np.bincount(self.faces.ravel(), np.repeat(area, 3), minlength=len(self.vertices)), 1e-300)
-
-    @cached_property
-    def vertex_normals(self) -> FloatArray:
-        """#V by 3, of length 1."""
-        return vertex_normals(self.vertices, self.faces)
-
-    def to_vertices(self, of_faces: FloatArray) -> FloatArray:
-        """Return the sum over the faces (#F by N) at each vertex (#V by N)."""
-        return np.stack(
-            [
-                np.bincount(self.faces.ravel(), np.repeat(column, 3), minlength=len(self.vertices))
-                for column in of_faces.T
-            ],
-            axis=1,
-        )
+        third = np.repeat(self.face_areas / 3.0, 3)
+        return np.maximum(np.bincount(self.faces.ravel(), third, minlength=len(self.vertices)), 1e-300)
 
     def smooth(self, values: FloatArray, length: float) -> FloatArray:
         """Return values (#V or #V by N) smoothed over a length [m]: one implicit step of the heat equation."""
@@ -84,7 +166,7 @@ class Operators:
 
     def solve(
         self,
-        fixed: NDArray[np.int64],
+        fixed: Ids,
         given: FloatArray,
         *,
         data: FloatArray | None = None,
@@ -134,22 +216,20 @@ class MirrorMap:
         return values + 0.5 * self.weight * (sign * (self.matrix @ values) - values)
 
 
-def mirror_map(
-    vertices: FloatArray, faces: NDArray[np.int64], normal: FloatArray, offset: float, *, reach: float
-) -> MirrorMap:
+def mirror_map(mesh: TriangleMesh, normal: FloatArray, offset: float, *, reach: float) -> MirrorMap:
     """Find where a mesh's vertices lie when they are mirrored in the plane normal . x = offset.
 
     Args:
-        vertices: #V by 3 [m], faces: #F by 3.
+        mesh: the mesh.
         normal: of length 1, offset: [m].
         reach: a vertex whose image is so far from the surface has no mirror image [m].
     """
     from scipy.spatial import cKDTree
 
+    vertices, faces = mesh.vertices, mesh.faces
     corners = vertices[faces]
     image = reflected(vertices, normal, offset)
-    turned = face_normals(vertices, faces)
-    facing = reflected(Operators(vertices=vertices, faces=faces).vertex_normals, normal)
+    facing = reflected(mesh.vertex_normals, normal)
     tried = min(_TRIED, len(faces))
     nearest = np.asarray(cKDTree(corners.mean(axis=1)).query(image, k=tried)[1]).reshape(len(image), tried)
     best, shares, chosen = np.full(len(image), np.inf), np.zeros((len(image), 3)), np.zeros(len(image), dtype=np.int64)
@@ -157,7 +237,7 @@ def mirror_map(
         share = nearest_on_triangles(corners[column], image)
         away = np.linalg.norm(np.einsum("vk,vkj->vj", share, corners[column]) - image, axis=1)
         # Another layer that faces the other way is not the mirror image.
-        cost = away + np.where(np.einsum("ij,ij->i", turned[column], facing) < 0.0, reach, 0.0)
+        cost = away + np.where(np.einsum("ij,ij->i", mesh.face_normals[column], facing) < 0.0, reach, 0.0)
         better = cost < best
         best, chosen = np.where(better, cost, best), np.where(better, column, chosen)
         shares[better] = share[better]

@@ -5,33 +5,51 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import FloatArray, InputError, expect, find_unused_name, format_count, polyline_length, short_repr
+from warpflat.core import (
+    InputError,
+    expect,
+    find_unused_name,
+    format_count,
+    polyline_length,
+    segment_lengths,
+    short_repr,
+)
 from warpflat.flat import (
     Fabric,
     Surface,
+    area_vectors,
     as_fabric,
     border_loops,
-    euler_characteristic,
     line_from_curve,
     line_on_plane,
     plane_sections,
     triangulate,
 )
-from warpflat.garment.seams.anatomy import HOLE, ROLES, Anatomy, averaged_limbs, axis_name, describe, find_anatomy
+from warpflat.garment.seams.anatomy import (
+    HOLE,
+    ROLES,
+    TAILORED,
+    Anatomy,
+    averaged_limbs,
+    axis_name,
+    describe,
+    find_anatomy,
+    has_role,
+)
 from warpflat.garment.seams.by_hand import HAND, cut_by_hand, join_ends, keep_seams, leave_to_hand
-from warpflat.garment.seams.cloth import Cloth, PieceMesh
+from warpflat.garment.seams.cloth import ALIKE, Cloth, PieceMesh, are_among
 from warpflat.garment.seams.energy import Trial, cut_by_energy
-from warpflat.garment.seams.fields import Operators
 from warpflat.garment.seams.measure import laid_flat
 from warpflat.garment.seams.openings import open_tubes
 from warpflat.garment.seams.options import SeamOptions
-from warpflat.garment.seams.solid import is_panel, part_solids
+from warpflat.garment.seams.solid import LaidFlat, is_panel, part_solids
 from warpflat.garment.seams.symmetric import averaged, mirrored
-from warpflat.garment.seams.tailor import FACING, TAILORED, cut_as_a_tailor, draw_fields, side_word, with_drawn_sleeves
+from warpflat.garment.seams.tailor import FACING, cut_as_a_tailor, draw_fields, side_word, with_drawn_sleeves
 from warpflat.garment.seams.thickness import without_thickness
 from warpflat.pattern import FoundSeam
 
@@ -45,9 +63,6 @@ _BAND_AREA, _BAND = 0.12, 27.0
 _ALONG = 0.2
 #: What a band is called, by the border along which it runs.
 BANDS = {"waist": "waistband", "neck": "neck_band", "hem": "hem_band", "sleeve": "cuff", "leg": "cuff"}
-
-# Pieces are alike if sizes, outlines and extents agree within this share.
-_ALIKE = 0.015
 
 # A piece whose parts in front and behind differ by less than this share is of neither.
 _AROUND = 0.35
@@ -136,68 +151,27 @@ def find_seams(
 
 
 def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric: Fabric | None) -> FoundSeams:
-    cloth, closed_holes = _without_holes(cloth)
+    cloth, holes = _without_holes(cloth)
     cloth, turned = without_thickness(cloth)
-    turned = [*closed_holes, *turned]
-    operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
-    if options.smooth:
-        cloth, words = _smoothed(cloth, operators, options.smooth)
-        turned = [words, *turned]
-        operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
-    anatomy = find_anatomy(cloth, operators, up=options.up, front=options.front)
-    even, moved, why = False, "", ""
+    cloth, smoothed = _smoothed(cloth, options.smooth) if options.smooth else (cloth, [])
+    anatomy = find_anatomy(cloth, up=options.up, front=options.front)
+    moved, even = "", False
     if not options.cuts:  # what the user draws on one side is on that side alone
-        cloth, moved, even = averaged(cloth, anatomy, operators)
-        operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
+        cloth, moved, even = averaged(cloth, anatomy)
     anatomy = replace(anatomy, limbs=averaged_limbs(anatomy, alike=even))
     role = np.zeros(len(cloth.vertices))
     for border in anatomy.borders:
         role[border.vertices] = 1.0 + ROLES.index(border.role)
-    cloth = replace(cloth, values={**cloth.values, "role": role})
-    notes, auto = list[str](), options.find == "auto"
-    if anatomy.kind in TAILORED:
-        fields = draw_fields(cloth, anatomy, operators)
-        tailored = auto or options.keep
-        cloth, notes = (
-            cut_as_a_tailor(fields, anatomy, hood=not options.forbids("hood"))
-            if tailored
-            else (with_drawn_sleeves(fields, anatomy, anywhere=True), [])
-        )
-        for name in list(cloth.seams):
-            if not (auto or name.startswith(HAND) or options.keeps(name)):
-                cloth = cloth.without_seam(name)
-    cloth, left = leave_to_hand(cloth, options)
-    cloth, kept = keep_seams(cloth, anatomy, options)
-    cloth, inside = join_ends(cloth)
-    notes += [*left, *kept, *inside]
-    if auto:
-        shape = anatomy.kind not in TAILORED and not is_panel(cloth)
-        alike = even and shape
-        if alike:
-            cloth, why = mirrored(cloth, anatomy)
-        cloth, more = part_solids(
-            cloth,
-            shape=shape,
-            mirror=anatomy if alike and not why else None,
-            most=options.most_pieces,
-            measure=None
-            if fabric is None or anatomy.kind in TAILORED
-            else lambda trial, mesh, width: laid_flat(_surface_of(trial, anatomy, mesh, surface), fabric, width),
-        )
-        notes += more
-    if even:
-        cloth, why = mirrored(cloth, anatomy)
-    for name in list(cloth.seams):
-        if not name.startswith(HAND) and options.forbids(name):
-            cloth = cloth.without_seam(name)
+    cloth = cloth.with_values(role=role)
+    cloth, notes, why = _first_seams(cloth, anatomy, surface, options, fabric, even=even)
     cloth = open_tubes(cloth, anatomy, options)
     by_hand = tuple(name.removeprefix(HAND) for name in cloth.seams if name.startswith(HAND))
     options = replace(options, keep=(*options.keep, *by_hand))
     cloth = replace(cloth, seams={name.removeprefix(HAND): edges for name, edges in cloth.seams.items()})
-    if not auto:
-        _require_open(cloth)
     trials, basic = list[Trial](), set(cloth.seams)
-    if fabric is not None and auto:
+    if options.find == "none":
+        _require_open(cloth)
+    elif fabric is not None:
         try:
             cloth, trials, _ = cut_by_energy(
                 cloth, anatomy, fabric, options, lambda trial, mesh: _surface_of(trial, anatomy, mesh, surface)
@@ -214,28 +188,77 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
         moved = f"both sides are averaged and cut alike: {moved}"
     price = {trial.name: trial for trial in trials}
     pieces = _as_surfaces(cloth, anatomy, surface)
+    alike = [] if anatomy.kind in TAILORED else _alike(pieces)
     return FoundSeams(
         pieces=tuple(pieces),
         seams=tuple(
             FoundSeam(
                 name=name,
-                length=float(np.linalg.norm(np.diff(cloth.vertices[edges], axis=1), axis=2).sum()),
+                length=cloth.seam_length(name),
                 released=price[name].released if name in price else None,
                 needed=price[name].needed if name in price else "",
             )
-            for name, edges in cloth.seams.items()
+            for name in cloth.seams
         ),
         what=describe(anatomy),
         up=axis_name(anatomy.up),
         front=axis_name(anatomy.front),
-        notes=(
-            *notes,
-            *turned,
-            *([moved] if moved else []),
-            *(() if anatomy.kind in TAILORED else _alike(pieces)),
-            *anatomy.notes,
-        ),
+        notes=(*notes, *smoothed, *holes, *turned, *filter(None, [moved]), *alike, *anatomy.notes),
     )
+
+
+def _first_seams(
+    cloth: Cloth, anatomy: Anatomy, surface: Surface, options: SeamOptions, fabric: Fabric | None, *, even: bool
+) -> tuple[Cloth, list[str], str]:
+    """Return the cloth with the seams that its kind has, or its shape asks for, and those of the user; notes; and why sides differ.
+
+    Args:
+        cloth: with the user's seams.
+        anatomy: of the garment.
+        surface: as it was read.
+        options: which seams are made.
+        fabric: by which a closed thing is measured.
+        even: whether both sides are to be cut alike.
+    """
+    notes, why, auto = list[str](), "", options.find == "auto"
+    if anatomy.kind in TAILORED:
+        cloth = draw_fields(cloth, anatomy)
+        if auto or options.keep:
+            cloth, notes = cut_as_a_tailor(cloth, anatomy, hood=not options.forbids("hood"))
+        else:
+            cloth = with_drawn_sleeves(cloth, anatomy, anywhere=True)
+        for name in list(cloth.seams):
+            if not (auto or name.startswith(HAND) or options.keeps(name)):
+                cloth = cloth.without_seam(name)
+    for step in (
+        lambda cloth: leave_to_hand(cloth, options),
+        lambda cloth: keep_seams(cloth, anatomy, options),
+        join_ends,
+    ):
+        cloth, told = step(cloth)
+        notes += told
+    if auto:
+        shape = anatomy.kind not in TAILORED and not is_panel(cloth)
+        if even and shape:
+            cloth, why = mirrored(cloth, anatomy)
+        measure = None
+        if fabric is not None and anatomy.kind not in TAILORED:
+            measure = partial(_laid_flat, anatomy=anatomy, surface=surface, fabric=fabric)
+        mirror = anatomy if even and shape and not why else None
+        cloth, told = part_solids(cloth, shape=shape, mirror=mirror, most=options.most_pieces, measure=measure)
+        notes += told
+    if even:
+        cloth, why = mirrored(cloth, anatomy)
+    for name in list(cloth.seams):
+        if not name.startswith(HAND) and options.forbids(name):
+            cloth = cloth.without_seam(name)
+    return cloth, notes, why
+
+
+def _laid_flat(
+    cloth: Cloth, mesh: PieceMesh, width: float, *, anatomy: Anatomy, surface: Surface, fabric: Fabric
+) -> LaidFlat:
+    return laid_flat(_surface_of(cloth, anatomy, mesh, surface), fabric, width)
 
 
 def _require_open(cloth: Cloth) -> None:
@@ -245,8 +268,8 @@ def _require_open(cloth: Cloth) -> None:
         InputError: there is one.
     """
     for mesh in cloth.pieces():
-        loops = len(border_loops(mesh.faces.astype(np.int32)))
-        if loops == 0 or euler_characteristic(mesh.faces.astype(np.int32)) != 2 - loops:
+        loops = len(mesh.loops)
+        if loops == 0 or sum(mesh.shape) != 2:
             x, y, z = (100.0 * mesh.vertices.mean(axis=0)).tolist()
             what = "is closed" if loops == 0 else "has a handle"
             raise InputError(
@@ -255,26 +278,26 @@ def _require_open(cloth: Cloth) -> None:
             )
 
 
-def _smoothed(cloth: Cloth, operators: Operators, length: float) -> tuple[Cloth, str]:
-    """Return the cloth without wrinkles shorter than a few times a length [m], and how far it has moved.
+def _smoothed(cloth: Cloth, length: float) -> tuple[Cloth, list[str]]:
+    """Return the cloth without wrinkles shorter than a few times a length [m], and a note on how far it has moved.
 
     Smoothing once draws a tube in by the square of length over radius; what it took from its own result is given back, so that the
     fourth power is left.
     """
-    once = operators.smooth(cloth.vertices, length)
-    vertices = 2.0 * once - operators.smooth(once, length)
+    once = cloth.smooth(cloth.vertices, length)
+    vertices = 2.0 * once - cloth.smooth(once, length)
     moved = 1e3 * np.linalg.norm(vertices - cloth.vertices, axis=1)
     words = f"smoothed over {1e3 * length:g} mm, on request: it moved by {moved.mean():.1f} mm in the mean, {moved.max():.1f} mm at most"
-    return replace(cloth, vertices=vertices), words
+    return replace(cloth, vertices=vertices), [words]
 
 
 def _without_holes(cloth: Cloth) -> tuple[Cloth, list[str]]:
     """Return the cloth with its holes closed, and a note if there were any: nobody sews around a fault of the mesh, or a buttonhole."""
     vertices, fans, longest = [cloth.vertices], list[Ids](), 0.0
-    for loop in cloth.borders():
+    for loop in cloth.loops:
         ring = cloth.vertices[loop]
-        length = polyline_length(np.append(ring, ring[:1], axis=0))
-        if length < HOLE * np.sqrt(float(cloth.face_areas.sum())):
+        length = polyline_length(ring, closed=True)
+        if length < HOLE * cloth.size:
             middle = np.full(len(loop), len(cloth.vertices) + len(fans))
             vertices.append(ring.mean(axis=0)[None])
             fans.append(np.stack([np.roll(loop, -1), loop, middle], axis=1))
@@ -295,17 +318,16 @@ def _without_holes(cloth: Cloth) -> tuple[Cloth, list[str]]:
 def cloth_of(surface: Surface) -> Cloth:
     """Return the cloth of a surface: its triangles, wound so that their normals point out."""
     triangles, _ = triangulate(surface.faces)
-    faces = triangles.astype(np.int64)
-    outwards = _volume(surface.vertices, faces) >= 0.0
-    return Cloth(vertices=surface.vertices.copy(), faces=faces if outwards else faces[:, ::-1].copy())
+    cloth = Cloth(vertices=surface.vertices.copy(), faces=triangles.astype(np.int64))
+    return cloth if _volume(cloth) >= 0.0 else replace(cloth, faces=cloth.faces[:, ::-1].copy())
 
 
-def _volume(vertices: FloatArray, faces: Ids) -> float:
+def _volume(cloth: Cloth) -> float:
     """Return the volume inside of a mesh whose borders are closed by fans [m3]; negative where normals point inwards."""
-    points = vertices - vertices[np.unique(faces)].mean(axis=0)
-    a, b, c = points[faces].transpose(1, 0, 2)
+    points = cloth.vertices - cloth.vertices[np.unique(cloth.faces)].mean(axis=0)
+    a, b, c = points[cloth.faces].transpose(1, 0, 2)
     total = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum())
-    for loop in border_loops(faces.astype(np.int32)):
+    for loop in cloth.loops:
         ring = points[loop]
         following, middle = np.roll(ring, -1, axis=0), ring.mean(axis=0)
         total += float((np.cross(following, ring) @ middle).sum())
@@ -322,14 +344,14 @@ def _as_surfaces(cloth: Cloth, anatomy: Anatomy, whole: Surface) -> list[Surface
         for vertex, number in enumerate(np.round(cloth.values["role"]).tolist())
         if number > 0.0
     }
-    of_face = np.empty(len(cloth.faces), dtype=np.int64)
-    for number, mesh in enumerate(meshes):
-        of_face[mesh.face_of] = number
-    beside = _faces_beside(cloth)
+    he, beside = cloth.half_edges, dict[tuple[int, ...], list[int]]()
+    at_seam = np.flatnonzero(are_among(he.edges, cloth.seam_edges())[he.edge])
+    for edge, number in zip(he.edges[he.edge[at_seam]].tolist(), cloth.parts[he.face[at_seam]].tolist(), strict=True):
+        beside.setdefault(tuple(edge), []).append(number)
     made = []
     for number, mesh in enumerate(meshes):
         piece = _surface_of(cloth, anatomy, mesh, whole, name=names[number])
-        lines = _edge_lines(piece, mesh, number, names, label, role, of_face, beside)
+        lines = _edge_lines(piece, mesh, number, names, label, role, beside)
         made.append(replace(piece, lines={**lines, **piece.lines}))
     # Repairs of the whole are told once.
     if made and whole.notes:
@@ -339,36 +361,16 @@ def _as_surfaces(cloth: Cloth, anatomy: Anatomy, whole: Surface) -> list[Surface
 
 def _surface_of(cloth: Cloth, anatomy: Anatomy, mesh: PieceMesh, whole: Surface, *, name: str = "piece") -> Surface:
     """Return a piece as a surface, with its grain."""
-    faces = np.full((len(mesh.faces), 4), -1, dtype=np.int32)
-    faces[:, :3] = mesh.faces
-    piece = Surface(
-        vertices=mesh.vertices.copy(),
-        faces=faces,
-        name=name,
-        sources=whole.sources,
-    )
+    piece = replace(mesh.as_surface(name), sources=whole.sources)
     grain = _grain(piece, cloth, mesh, anatomy)
     return piece if grain is None else replace(piece, lines={GRAIN: grain})
-
-
-def _faces_beside(cloth: Cloth) -> Mapping[tuple[int, int], list[int]]:
-    """Return the faces at each edge of a seam."""
-    wanted = set(map(tuple, cloth.seam_edges().tolist()))
-    found: dict[tuple[int, int], list[int]] = {}
-    for k in range(3):
-        sides = np.sort(np.stack([cloth.faces[:, k], cloth.faces[:, (k + 1) % 3]], axis=1), axis=1)
-        for face, edge in enumerate(map(tuple, sides.tolist())):
-            if edge in wanted:
-                found.setdefault(edge, []).append(face)
-    return found
 
 
 def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[str]:
     """Return names of pieces: "left_sleeve", "front", "right_back_leg"; a number behind those that occur twice."""
     area = cloth.face_areas
     plain, bands = [], [_band(cloth, mesh) for mesh in meshes]
-    of_sleeve = cloth.labels.get("sleeve", np.full(len(cloth.faces), -1))
-    sleeves = [int(np.median(of_sleeve[mesh.face_of])) for mesh in meshes]
+    sleeves = [cloth.sleeve_of(mesh) for mesh in meshes]
     # A short sleeve from the armhole on is no cuff.
     bands = [
         "" if band == "cuff" and sleeves.count(sleeve) == 1 and sleeve >= 0 else band
@@ -379,7 +381,7 @@ def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[
         weight = area[mesh.face_of]
         corners = cloth.faces[mesh.face_of]
         facing = cloth.values.get(FACING, np.zeros(len(cloth.vertices)))
-        across = (cloth.vertices[corners].mean(axis=1) @ anatomy.normal - anatomy.offset) * weight
+        across = anatomy.across(cloth.vertices[corners].mean(axis=1)) * weight
         # Wholly on one side, or over the middle; of the front and the back, or of one of them.
         lopsided = abs(float(across.sum())) > 0.6 * float(np.abs(across).sum())
         side = float(across.sum())
@@ -392,10 +394,9 @@ def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[
             name = f"{side_word(side)}_{'hood' if of_hood else 'sleeve'}"
         elif anatomy.kind == "trousers":
             # By its role: vertices of a cloth that has been mirrored have other numbers.
-            ends = np.round(cloth.values["role"][mesh.vertex_of]) == 1 + ROLES.index("leg")
-            part = "leg" if ends.any() else "yoke"
+            part = "leg" if has_role(cloth, mesh.vertex_of, "leg").any() else "yoke"
             name = "_".join(filter(None, [side_word(side) if lopsided else "", face, part]))
-        elif anatomy.kind in ("top", "dress", "skirt", "jumpsuit"):
+        elif anatomy.kind in TAILORED:
             name = f"{side_word(side)}_{face or 'side'}" if lopsided else face or "body"
         elif len(meshes) == 1:
             name = anatomy.kind if anatomy.kind not in ("other", "closed") else "piece"
@@ -419,17 +420,16 @@ def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[
 
 def _band(cloth: Cloth, mesh: PieceMesh) -> str:
     """Return what a piece is called that is a narrow strip along the waist, the neck, a sleeve's or a leg's end; "" for others."""
-    area = float(cloth.face_areas[mesh.face_of].sum())
-    loops = [np.append(loop, loop[0]) for loop in border_loops(mesh.faces.astype(np.int32))]
-    steps = [np.linalg.norm(np.diff(mesh.vertices[loop], axis=0), axis=1) for loop in loops]
+    area = float(mesh.face_areas.sum())
+    steps = [segment_lengths(mesh.vertices[loop], closed=True) for loop in mesh.loops]
     around = float(sum(step.sum() for step in steps))
-    if "role" not in cloth.values or area > _BAND_AREA * float(cloth.face_areas.sum()) or around**2 < _BAND * area:
+    if area > _BAND_AREA * float(cloth.face_areas.sum()) or around**2 < _BAND * area:
         return ""
-    roles = np.round(cloth.values["role"][mesh.vertex_of]).astype(int)
 
     def along(role: str) -> float:
-        own = roles == 1 + ROLES.index(role)
-        return sum(float(step[own[loop[:-1]] & own[loop[1:]]].sum()) for loop, step in zip(loops, steps, strict=True))
+        own = has_role(cloth, mesh.vertex_of, role)
+        pairs = zip(mesh.loops, steps, strict=True)
+        return sum(float(step[own[loop] & own[np.roll(loop, -1)]].sum()) for loop, step in pairs)
 
     most = max(BANDS, key=along)
     return BANDS[most] if along(most) > _ALONG * around else ""
@@ -439,23 +439,16 @@ def _alike(pieces: Sequence[Surface]) -> list[str]:
     """Return a note on pieces that are much the same, or mirror images: a maker draws them once."""
     measures = []
     for piece in pieces:
-        a, b, c = piece.vertices[piece.faces[:, :3]].transpose(1, 0, 2)
-        around = [piece.vertices[np.append(loop, loop[0])] for loop in border_loops(piece.faces)]
-        length = sum(float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()) for ring in around)
+        length = sum(polyline_length(piece.vertices[loop], closed=True) for loop in border_loops(piece.faces))
+        area = np.linalg.norm(area_vectors(piece.vertices, piece.faces[:, :3]), axis=1).sum()
         axes = np.linalg.eigh(np.cov((piece.vertices - piece.vertices.mean(axis=0)).T))[1]
-        measures.append(
-            [
-                np.sqrt(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()),
-                length,
-                *np.ptp(piece.vertices @ axes, axis=0),
-            ]
-        )
+        measures.append([np.sqrt(area), length, *np.ptp(piece.vertices @ axes, axis=0)])
     left = list(range(len(pieces)))
     notes = []
     while left:
         first, *others = left
         size, around, *extents = measures[first]
-        off = _ALIKE * np.array([size, around, *[max(extents)] * 3])
+        off = ALIKE * np.array([size, around, *[max(extents)] * 3])
         same = [first, *(k for k in others if (np.abs(np.subtract(measures[k], measures[first])) < off).all())]
         left = [k for k in left if k not in same]
         names = [pieces[k].name for k in same]
@@ -471,8 +464,7 @@ def _edge_lines(
     names: Sequence[str],
     label: Mapping[tuple[int, ...], str],
     role: Mapping[int, str],
-    of_face: Ids,
-    beside: Mapping[tuple[int, int], list[int]],
+    beside: Mapping[tuple[int, ...], list[int]],
 ) -> dict[str, NDArray[np.int32]]:
     """Return the stretches of a piece's border as lines, by the seam and the piece to which each is sewn, or by its role."""
     lines: dict[str, NDArray[np.int32]] = {}
@@ -486,7 +478,7 @@ def _edge_lines(
             if seam is None:
                 keys.append((role.get(edge[0], role.get(edge[1], "edge")), -1))
             else:
-                others = [int(of_face[face]) for face in beside[edge] if of_face[face] != number]
+                others = [other for other in beside[edge] if other != number]
                 keys.append((seam, others[0] if others else number))
         starts = [k for k in range(len(keys)) if keys[k] != keys[k - 1]]
         if not starts:
@@ -505,7 +497,7 @@ def _edge_lines(
 
 def _grain(piece: Surface, cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy) -> NDArray[np.int32] | None:
     """Return the line along which a piece's grain runs: down the trunk and the leg, along a sleeve; None where there is none."""
-    sleeve = int(np.median(cloth.labels["sleeve"][mesh.face_of])) if "sleeve" in cloth.labels else -1
+    sleeve = cloth.sleeve_of(mesh)
     sleeves = anatomy.limbs_of("sleeve")
     # A garment that leans in its file hangs along its own plane of symmetry.
     upright = anatomy.up if anatomy.mirror is None else anatomy.up - (anatomy.up @ anatomy.normal) * anatomy.normal
@@ -514,13 +506,11 @@ def _grain(piece: Surface, cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy) -> N
         # A gore, a strip: nothing but its own length says how it hangs.
         spread, axes = np.linalg.eigh(np.cov((piece.vertices - piece.vertices.mean(axis=0)).T))
         along = axes[:, 2] if spread[2] > _LONG * spread[1] else along
-    a, b, c = piece.vertices[piece.faces[:, :3]].transpose(1, 0, 2)
-    normals = np.cross(b - a, c - a)
-    facing = normals.sum(axis=0)
-    middle = np.average((a + b + c) / 3.0, axis=0, weights=np.maximum(np.linalg.norm(normals, axis=1), 1e-300))
+    facing = mesh.area_vectors.sum(axis=0)
+    middle = np.average(mesh.vertices[mesh.faces].mean(axis=1), axis=0, weights=np.maximum(mesh.face_areas, 1e-300))
     count = np.bincount(mesh.vertex_of, minlength=len(cloth.vertices))
     opened = mesh.vertices[count[mesh.vertex_of] > 1]
-    around = len(opened) > 0 and np.linalg.norm(facing) < 0.6 * np.linalg.norm(normals, axis=1).sum()
+    around = len(opened) > 0 and np.linalg.norm(facing) < 0.6 * mesh.face_areas.sum()
     if around:
         # It lies around a limb or the trunk: opposite to where it is opened.
         facing = middle - opened.mean(axis=0)

@@ -11,20 +11,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, FloatArray, reflected
-from warpflat.flat import LaidCloth, border_loops, components
-from warpflat.garment.seams.anatomy import ROLES, Anatomy
+from warpflat.core import BoolArray, FloatArray, reflected, unit
+from warpflat.flat import LEAST_MOUTH, TRIED, LaidCloth, border_loops, components
+from warpflat.garment.seams.anatomy import END, FROM_SHOULDERS, Anatomy, has_role
 from warpflat.garment.seams.by_hand import level_of
-from warpflat.garment.seams.cloth import Cloth
-from warpflat.garment.seams.fields import Operators
+from warpflat.garment.seams.cloth import ALIKE, Cloth
+from warpflat.garment.seams.fields import TriangleMesh
 from warpflat.garment.seams.measure import Measured
 from warpflat.garment.seams.options import SeamOptions
 from warpflat.garment.seams.tailor import FACING, LEFT
 
-__all__ = ["WAIST", "Line", "Offer", "first_of_equals", "offers"]
+__all__ = ["APART", "WAIST", "Line", "Offer", "first_of_equals", "offers"]
 
 Ids = NDArray[np.int64]
 
@@ -36,18 +35,14 @@ _SMOOTH = 0.05
 _BULGE, _MISFIT, _PLACES = 0.12, 0.08, 6
 # Darts to a place at the border reach inwards by these shares.
 _REACHES = (0.06, 0.11)
-# A dart is between these long; its tip keeps this far from the border.
-_SHORTEST, _LONGEST, _NARROW = 0.03, 0.32, 0.03
-# A dart opens by at least this [m], and no wider than this share of its length: such a wedge is no dart.
-MOUTH, WIDE = 4e-3, 0.6
+# A dart is no longer than this.
+_LONGEST = 0.32
+#: Nearer than this a dart's ends, its tip and the border, two darts, two places, and a place and the plane of symmetry are one.
+APART = 0.03
+#: What opens wider than this share of its length is a wedge, and no dart.
+WIDE = 0.6
 # A centimetre sewn counts as this much cloth beyond the limit [m2].
 _PRICE = 1e-5
-# What is worth the same within this share is chosen by its place.
-_EQUAL = 0.02
-# So many darts are offered for a piece. They, and places, are so far from each other.
-_OFFERS, _APART = 3, 0.03
-# The hem of what opens in front is the lowest share of its height.
-_HEM = 0.15
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,7 +70,7 @@ class Line:
 
     def beside(self, anatomy: Anatomy) -> float:
         """Return how far it lies to the left of the garment's plane of symmetry [m]."""
-        return float(self.point @ anatomy.normal) - anatomy.offset
+        return float(anatomy.across(self.point))
 
     def is_lopsided(self, anatomy: Anatomy) -> bool:
         """Return whether it has a mirror image that is another one."""
@@ -83,7 +78,7 @@ class Line:
             return False
         # A line around the front runs on both sides, wherever its place is.
         around = self.level is not None and self.level[0] == FACING
-        return around or abs(self.beside(anatomy)) > 0.03 * anatomy.size
+        return around or abs(self.beside(anatomy)) > APART * anatomy.size
 
     def mirrored(self, anatomy: Anatomy) -> Line:
         """Return its mirror image."""
@@ -131,8 +126,8 @@ class Offer:
 
 
 def first_of_equals(values: FloatArray) -> Ids:
-    """Return the order of values from the largest on; those that agree within a share are equal, and keep their places."""
-    bins = np.floor(np.log(np.maximum(values, 1e-12)) / _EQUAL)
+    """Return the order of values from the largest on; those that are alike keep their places."""
+    bins = np.floor(np.log(np.maximum(values, 1e-12)) / ALIKE)
     return np.lexsort((np.arange(len(values)), -bins))
 
 
@@ -157,7 +152,7 @@ def offers(
         *(_seams(cloth, piece, laid, places, anatomy, options, twice=twice) if may_part else ()),
     ):
         cost, sides = laid.price(rows), 2 if twice else 1
-        if not line.parts and not (cost.opens and MOUTH <= cost.opening <= WIDE * cost.length / len(rows)):
+        if not line.parts and not (cost.opens and LEAST_MOUTH <= cost.opening <= WIDE * cost.length / len(rows)):
             continue
         more = sides * len(rows) if line.parts else 0
         found.append(Offer(line=line, gain=sides * cost.relieved, length=sides * cost.length, more=more))
@@ -165,8 +160,8 @@ def offers(
     best = list[Offer]()
     for one in (found[k] for k in order.tolist()):
         alike = [other for other in best if other.line.name == one.line.name]
-        apart = all(np.linalg.norm(one.middle - other.middle) > _APART * anatomy.size for other in alike)
-        if one.gain > 0.0 and apart and len(alike) < _OFFERS:
+        apart = all(np.linalg.norm(one.middle - other.middle) > APART * anatomy.size for other in alike)
+        if one.gain > 0.0 and apart and len(alike) < TRIED:
             best.append(one)
     return best
 
@@ -180,13 +175,12 @@ def _darts(
     # A dart begins at no hem, and at no other dart.
     starts = loop[~_at_hem(cloth, own[loop], anatomy) & (np.bincount(own)[own[loop]] == 1)]
     inner = np.flatnonzero(~laid.border)
-    corners = surface.vertices[surface.faces[:, :3]]
-    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    across = surface.vertices @ anatomy.normal - anatomy.offset
-    middle = 0.03 * size
+    facing = piece.mesh.area_vectors
+    across = anatomy.across(surface.vertices)
+    middle = APART * size
     whole = anatomy.mirror is not None and not twice and across.min() < -middle and across.max() > middle
     away = np.linalg.norm(flat[loop][:, None] - flat[inner], axis=2).min(axis=0)
-    deep = inner[away >= _NARROW * size]
+    deep = inner[away >= APART * size]
     ends = list[tuple[int, int]]()
     for place in places:
         if whole and across[place] < -middle:
@@ -195,14 +189,11 @@ def _darts(
             ends += [(mouth, place) for mouth in laid.mouths(place) if mouth in starts]
         elif len(starts) and len(deep):
             # A place at the border is reached from there: inwards by a hand.
-            mouth = int(starts[np.linalg.norm(flat[starts] - flat[place], axis=1).argmin()])
-            near = deep[np.linalg.norm(flat[deep] - flat[mouth], axis=1).argmin()]
-            inwards = (flat[near] - flat[mouth]) / np.linalg.norm(flat[near] - flat[mouth])
-            for reach in _REACHES:
-                tip = flat[mouth] + reach * size * inwards
-                ends.append((mouth, int(deep[np.linalg.norm(flat[deep] - tip, axis=1).argmin()])))
+            mouth = laid.nearest(starts, flat[place])
+            inwards = unit(flat[laid.nearest(deep, flat[mouth])] - flat[mouth])
+            ends += [(mouth, laid.nearest(deep, flat[mouth] + reach * size * inwards)) for reach in _REACHES]
     for mouth, tip in dict.fromkeys(ends):
-        if not _SHORTEST * size < float(np.linalg.norm(flat[tip] - flat[mouth])) < _LONGEST * size:
+        if not APART * size < float(np.linalg.norm(flat[tip] - flat[mouth])) < _LONGEST * size:
             continue
         start, end = surface.vertices[[mouth, tip]]
         normal = np.cross(end - start, facing[(surface.faces[:, :3] == tip).any(axis=1)].mean(axis=0))
@@ -229,17 +220,16 @@ def _are_apart(rows: Sequence[Ids]) -> bool:
 def _places(piece: Measured, anatomy: Anatomy) -> list[int]:
     """Return where a piece bulges, and where it stays beyond the cloth's limits: vertices, those of each kind with the most first."""
     vertices, faces = piece.surface.vertices, piece.surface.faces[:, :3].astype(np.int64)
-    operators = Operators(vertices=vertices, faces=faces)
-    defect = np.array(trimesh.Trimesh(vertices, faces, process=False).vertex_defects)
-    defect[border_loops(piece.surface.faces)[0]] = 0.0
+    mesh = TriangleMesh(vertices=vertices, faces=faces)
+    defect = mesh.curvature.copy()
+    defect[mesh.loops[0]] = 0.0
     fit = piece.result.fit
     beyond = np.where(fit.demand.beyond, fit.area, 0.0)
     misfit = np.bincount(faces.ravel(), np.repeat(beyond / 3.0, 3), minlength=len(vertices))
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    edges = np.concatenate([edges, edges[:, ::-1]])
+    edges = np.concatenate([mesh.half_edges.edges, mesh.half_edges.edges[:, ::-1]])
     found = list[int]()
     for whole, least in ((defect, _BULGE), (misfit, _MISFIT * misfit.sum())):
-        density = operators.smooth(whole / operators.mass, _SMOOTH * anatomy.size)
+        density = mesh.smooth(whole / mesh.mass, _SMOOTH * anatomy.size)
         # Each vertex belongs to the peak that is reached from it by climbing.
         order = edges[np.lexsort((density[edges[:, 1]], edges[:, 0]))]
         steepest = order[np.append(order[1:, 0] != order[:-1, 0], True)]
@@ -248,10 +238,10 @@ def _places(piece: Measured, anatomy: Anatomy) -> list[int]:
         up[steepest[climbs, 0]] = steepest[climbs, 1]
         while (up[up] != up).any():
             up = up[up]
-        total = np.bincount(up, np.maximum(density, 0.0) * operators.mass, minlength=len(vertices))
+        total = np.bincount(up, np.maximum(density, 0.0) * mesh.mass, minlength=len(vertices))
         tops = np.flatnonzero(total > max(least, 1e-12))
         for top in tops[first_of_equals(np.asarray(total[tops], dtype=np.float64))][:_PLACES].tolist():
-            if all(np.linalg.norm(vertices[top] - vertices[one]) > _APART * anatomy.size for one in found):
+            if all(np.linalg.norm(vertices[top] - vertices[one]) > APART * anatomy.size for one in found):
                 found.append(top)
     return found
 
@@ -304,11 +294,10 @@ def _tailored(
     surface, size = piece.surface, anatomy.size
     if not places:
         return
-    triangles = surface.vertices[surface.faces[:, :3]]
-    facing = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    facing = piece.mesh.area_vectors
     heights = surface.vertices @ anatomy.up
-    across = surface.vertices @ anatomy.normal - anatomy.offset
-    sleeve = "sleeve" in cloth.labels and int(np.median(cloth.labels["sleeve"][piece.mesh.face_of])) >= 0
+    across = anatomy.across(surface.vertices)
+    sleeve = cloth.sleeve_of(piece.mesh) >= 0
     whole = across.min() < -0.08 * size and across.max() > 0.08 * size
     if not sleeve:
         if whole:
@@ -316,7 +305,7 @@ def _tailored(
             yield Line(name=name, normal=anatomy.normal, point=anatomy.offset * anatomy.normal)
         tall = float(np.ptp(heights))
         name, level, waist = "yoke", float(heights[places[0]]), None
-        if anatomy.kind in ("top", "dress", "jumpsuit") and (tall > 0.8 * size or options.waist is not None):
+        if anatomy.kind in FROM_SHOULDERS and (tall > 0.8 * size or options.waist is not None):
             # Where the body has it, or the trunk is narrowest.
             waist = level_of(cloth, anatomy, WAIST, options)
         if waist is not None and 0.2 * tall < waist - heights.min() < 0.8 * tall:
@@ -345,10 +334,7 @@ def _at_hem(cloth: Cloth, vertices: Ids, anatomy: Anatomy) -> BoolArray:
 
     No dart begins there: what hangs is shaped from above.
     """
-    if "role" not in cloth.values:
-        return np.zeros(len(vertices), dtype=bool)
-    role = np.round(cloth.values["role"][vertices])
     heights = cloth.vertices @ anatomy.up
-    low = heights[vertices] < heights.min() + _HEM * np.ptp(heights)
-    ends = np.isin(role, [1 + ROLES.index(name) for name in ("hem", "sleeve", "leg")])
-    return np.asarray(ends | (low & (role == 1 + ROLES.index("opening"))))
+    low = heights[vertices] < heights.min() + END * np.ptp(heights)
+    ends = has_role(cloth, vertices, "hem", "sleeve", "leg")
+    return np.asarray(ends | (low & has_role(cloth, vertices, "opening")))

@@ -13,18 +13,17 @@ from warpflat.core import FloatArray, InputError, arc_lengths, laid_upon, points
 from warpflat.flat import (
     Fabric,
     Flattening,
-    RelaxOptions,
     Surface,
     as_rigid_layout,
     border_loops,
     coarse_options,
-    euler_characteristic,
     flatten,
     is_injective,
 )
 from warpflat.garment.seams.anatomy import Anatomy
 from warpflat.garment.seams.cloth import Cloth, PieceMesh
 from warpflat.garment.seams.solid import NARROW, SEWABLE, LaidFlat, parts_within
+from warpflat.garment.seams.symmetric import mirror_image
 
 __all__ = [
     "OWNER",
@@ -32,7 +31,6 @@ __all__ = [
     "TRIAL_LEFT",
     "Measure",
     "Measured",
-    "is_disk",
     "laid_flat",
     "least_width",
     "measured",
@@ -45,8 +43,6 @@ Measure = Callable[..., list["Measured"]]
 
 # A piece is narrow between stretches of its border that are longer than so many times its width.
 _BESIDE_NECK = 3.0
-# Pieces of as many faces are the same if the sums of their coordinates agree within this [m].
-_SAME = 1e-6
 #: Labels of faces: the number of the piece that each was of when that was measured, and its own.
 OWNER, _FACE = "piece before", "face before"
 #: Energies of prices are known to the first share, those of what is made to the second.
@@ -66,7 +62,6 @@ class Measured:
     outside: float
     energy: float
     area: float
-    place: FloatArray
     mirrored: bool = False
 
 
@@ -145,10 +140,6 @@ def _layout_before(
     return unfolded if unfolded is not None and is_injective(surface, unfolded) else None
 
 
-def is_disk(faces: Ids) -> bool:
-    return euler_characteristic(faces.astype(np.int32)) == 1 and len(border_loops(faces.astype(np.int32))) == 1
-
-
 def measured(
     cloth: Cloth,
     known: Sequence[Measured],
@@ -175,40 +166,33 @@ def measured(
     Raises:
         InputError: a piece cannot be flattened.
     """
-    trial_options = _trial_options(energy_left)
-    axes = np.stack([anatomy.normal, anatomy.up, anatomy.front], axis=1)
     found: list[Measured] = []
     for mesh in cloth.pieces(None if changed is None else np.isin(cloth.labels[OWNER], list(changed))):
-        # By the sums of their coordinates in the garment's own axes: those of a mirror image differ in one sign.
-        place = (mesh.vertices @ axes - [anatomy.offset, 0.0, 0.0]).sum(axis=0)
         alike = [one for one in (*known, *found) if len(one.mesh.faces) == len(mesh.faces)]
-        same = next((one for one in alike if np.abs(one.place - place).max() < _SAME), None)
+        same = next((one for one in alike if np.array_equal(one.mesh.vertices, mesh.vertices)), None)
         if same is not None:
             found.append(replace(same, mesh=mesh))
             continue
-        image = place * [-1.0, 1.0, 1.0]
-        same = next((one for one in alike if not one.mirrored and np.abs(one.place - image).max() < _SAME), None)
-        if same is not None and anatomy.mirror is not None:
-            found.append(replace(same, mesh=mesh, place=place, mirrored=True))
-            continue
+        if anatomy.mirror is not None:
+            others = [one for one in alike if not one.mirrored]
+            same = next((one for one in others if mirror_image(mesh, one.mesh, anatomy) is not None), None)
+            if same is not None:
+                found.append(replace(same, mesh=mesh, mirrored=True))
+                continue
         surface = prepare(cloth, mesh)
-        if not is_disk(mesh.faces):
+        if not mesh.is_disk:
             # A tube is opened when all seams are known.
             continue
-        datum = "grain" if "grain" in surface.lines else None
-        start = _layout_before(cloth, mesh, surface, known, anatomy)
-        result = flatten(surface, fabric=fabric, datum=datum, start=start, relax=trial_options)
-        fit = result.fit
-        area = float(fit.area.sum())
+        result = _laid(surface, fabric, energy_left, start=_layout_before(cloth, mesh, surface, known, anatomy))
+        area = float(result.fit.area.sum())
         found.append(
             Measured(
                 mesh=mesh,
                 surface=surface,
                 result=result,
-                outside=fit.outside * area,
+                outside=result.fit.outside * area,
                 energy=result.layout_measures["strain_energy_j"],
                 area=area,
-                place=place,
             )
         )
     return found
@@ -226,8 +210,7 @@ def laid_flat(surface: Surface, fabric: Fabric, width: float) -> LaidFlat:
         What it is; all of it is beyond its limit where it cannot be laid flat.
     """
     try:
-        datum = "grain" if "grain" in surface.lines else None
-        result = flatten(surface, fabric=fabric, datum=datum, relax=_trial_options(PRICE_LEFT))
+        result = _laid(surface, fabric, PRICE_LEFT)
     except InputError:
         return LaidFlat(outside=1.0, overlap=0.0, width=width)
     least, ends = _narrowest(surface, result.positions, max(width, SEWABLE))
@@ -235,9 +218,11 @@ def laid_flat(surface: Surface, fabric: Fabric, width: float) -> LaidFlat:
     return LaidFlat(outside=result.fit.outside, overlap=result.overlap, width=min(least, width), neck=neck)
 
 
-def _trial_options(energy_left: float) -> RelaxOptions:
-    """Return options that tell good from bad, no more; what is left is estimated at every step, and checked where it is little."""
-    return replace(coarse_options(), energy_left=energy_left, outline_left_mm=100.0 * energy_left, check_every=100)
+def _laid(surface: Surface, fabric: Fabric, energy_left: float, *, start: FloatArray | None = None) -> Flattening:
+    """Flatten a piece so far that good is told from bad; what is left is estimated at every step, and checked where it is little."""
+    relax = replace(coarse_options(), energy_left=energy_left, outline_left_mm=100.0 * energy_left, check_every=100)
+    datum = "grain" if "grain" in surface.lines else None
+    return flatten(surface, fabric=fabric, datum=datum, start=start, relax=relax)
 
 
 def _narrowest(surface: Surface, flat: FloatArray, width: float) -> tuple[float, Ids]:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core import find_unused_name
-from warpflat.flat import border_loops, tube_borders
+from warpflat.flat import tube_borders
 from warpflat.garment.seams.anatomy import Anatomy
 from warpflat.garment.seams.cloth import Cloth, PieceMesh, edge_components
 from warpflat.garment.seams.options import SeamOptions
-from warpflat.garment.seams.tailor import FACING, LEFT, side_word, tidied
+from warpflat.garment.seams.tailor import FACING, LEFT, side_word
 
 __all__ = ["open_tubes"]
 
@@ -33,7 +32,7 @@ def open_tubes(cloth: Cloth, anatomy: Anatomy, options: SeamOptions) -> Cloth:
         return cloth
     for _ in range(4 * (1 + len(anatomy.borders))):
         for mesh in cloth.pieces():
-            if len(border_loops(mesh.faces.astype(np.int32))) > 1 and _tubes(mesh):
+            if len(mesh.loops) > 1 and _tubes(mesh):
                 made = _opened(cloth, mesh, anatomy, options)
                 if made is not None:
                     cloth = made
@@ -45,7 +44,7 @@ def open_tubes(cloth: Cloth, anatomy: Anatomy, options: SeamOptions) -> Cloth:
 
 def _tubes(mesh: PieceMesh) -> int:
     """Return around how many of a piece's borders it is a tube."""
-    return len(tube_borders(Cloth(vertices=mesh.vertices, faces=mesh.faces).as_surface()))
+    return len(tube_borders(mesh.as_surface()))
 
 
 def _opened(cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy, options: SeamOptions) -> Cloth | None:
@@ -53,20 +52,12 @@ def _opened(cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy, options: SeamOption
     before, used = _tubes(mesh), np.unique(mesh.vertex_of)
     limbs = [limb for limb in anatomy.limbs if np.isin(anatomy.borders[limb.border].vertices, used).all()]
     for name, level, cost in _lines(cloth, anatomy, [limb.kind for limb in limbs]):
-        own = np.zeros(len(cloth.faces), dtype=np.int64)
-        own[mesh.face_of] = 1
-        marked = replace(cloth, labels={**cloth.labels, "own": own})
-        made, positive = tidied(marked, level, own > 0).split(level, own > 0)
-        own = made.labels["own"]
-        made = replace(made, labels={key: label for key, label in made.labels.items() if key != "own"})
-        lines = made.line_between(positive, own > 0)
-        seam, stride = made.seam_edges(), np.int64(len(made.vertices))
-        lines = lines[~np.isin(lines[:, 0] * stride + lines[:, 1], seam[:, 0] * stride + seam[:, 1])]
-        he = made.half_edges
-        parts = edge_components(lines, ends=np.union1d(he.edges[he.count == 1], seam))
+        own = np.isin(np.arange(len(cloth.faces)), mesh.face_of)
+        made, _, own, lines = cloth.parted(level, own)
+        parts = edge_components(made.new_edges(lines), ends=np.union1d(made.border_edges, made.seam_edges()))
         chosen = [(cost(made, part), part) for part in parts]
         for value, part in sorted(chosen, key=lambda one: one[0]):
-            across = float((made.vertices[np.unique(part)] @ anatomy.normal).mean()) - anatomy.offset
+            across = float(anatomy.across(made.vertices[np.unique(part)]).mean())
             title = name if level == LEFT else f"{name} {side_word(across)}"
             if not np.isfinite(value) or options.forbids(title):
                 continue
@@ -85,14 +76,14 @@ def _lines(cloth: Cloth, anatomy: Anatomy, limbs: list[str]) -> Iterator[tuple[s
         return float((cloth.vertices[np.unique(edges)] @ anatomy.up).mean())
 
     def beside(cloth: Cloth, edges: Ids) -> float:
-        return float(np.abs(cloth.vertices[np.unique(edges)] @ anatomy.normal - anatomy.offset).mean())
+        return float(np.abs(anatomy.across(cloth.vertices[np.unique(edges)])).mean())
 
     def behind(cloth: Cloth, edges: Ids) -> float:
         facing = float(cloth.values[FACING][np.unique(edges)].mean())
         return facing if facing < 0.0 else np.inf
 
     def ahead(cloth: Cloth, edges: Ids) -> float:
-        return behind(replace(cloth, values={FACING: -cloth.values[FACING]}), edges)
+        return behind(cloth.with_values(**{FACING: -cloth.values[FACING]}), edges)
 
     if limbs == ["sleeve"]:
         yield "underarm", FACING, height

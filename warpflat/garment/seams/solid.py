@@ -21,26 +21,24 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
-from scipy.spatial import cKDTree
 
-from warpflat.core import FloatArray, IntArray
-from warpflat.flat import border_loops, euler_characteristic, half_edges, inner_borders, join_labels, tube_borders
+from warpflat.core import FloatArray, IntArray, polyline_length, unit
+from warpflat.flat import border_loops, inner_borders
 from warpflat.garment.seams.anatomy import HOLE, Anatomy
-from warpflat.garment.seams.cloth import Cloth, PieceMesh, section
-from warpflat.garment.seams.fields import Operators
-from warpflat.garment.seams.symmetric import mirrored
-from warpflat.garment.seams.tailor import tidied
+from warpflat.garment.seams.cloth import SAME_WAY, Cloth, PieceMesh, section
+from warpflat.garment.seams.fields import TriangleMesh
+from warpflat.garment.seams.symmetric import mirror_image, mirrored
 
 __all__ = [
     "NARROW",
+    "OVERLAP",
     "SEWABLE",
     "SOLID",
     "LaidFlat",
-    "Measure",
+    "LayFlat",
     "is_open",
     "is_panel",
     "part_solids",
@@ -54,42 +52,42 @@ SOLID = "seam"
 
 # A part lies flat, or nearly, below this strain by estimate; a ball falls into eight gores by it.
 _FLAT = 0.022
-# Where it is measured, a part lies flat with less beyond its limit than this share of the whole, and less of it over itself [m2].
-_WORTH, _OVERLAP = 0.005, 1e-5
+# Where it is measured, a part lies flat with less beyond its limit than this share of the whole.
+_WORTH = 0.005
+#: What lies over itself by no more than this does not [m2].
+OVERLAP = 1e-5
 # No further cut is made for the shape while less of the whole than this is beyond its limit.
 _ENOUGH = 0.03
 # A part is narrow that is somewhere less wide than the first share of the size of the whole: nobody cuts a neck of cloth, or a tip, that
 # narrow. A cut that leaves one counts as the second strain more, where its width is nothing.
 NARROW, _THIN = 0.05, 0.05
-#: Nobody sews a neck of cloth narrower than this, half a usual allowance [m]; a part of less than such a share is a tip.
-SEWABLE, _TIP = 5e-3, 0.02
-# Normals are smoothed over this share of a part's size: wrinkles and facets are no shape.
+#: Nobody sews a neck of cloth narrower than this, half a usual allowance [m].
+SEWABLE = 5e-3
+# Normals, and rings around the ends of limbs, are smoothed over this share of the size: wrinkles and facets are no shape.
 _SMOOTH = 0.04
-# A cut pays for itself: a seam as long as the part is wide counts as this strain.
+# A cut pays for itself: a seam as long as the part is wide counts as this strain. So does a cut of a round part that leaves parts which
+# are not alike, as these are drawn once.
 _SEAM = 0.005
-# Parts that are alike are drawn once: a cut of a round part that leaves others, larger by this share, counts as this strain more.
-_ALIKE, _UNLIKE = 0.03, 0.005
-# Axes along which a part is as long as along another within this share are none of its own: those of space serve.
-_ROUND = 0.05
-# Axes are the same from this cosine on.
-_NEARLY = 0.97
+# Areas of parts of a round part are alike within the first share, and a part is as long along two of its axes within the second: then those
+# of space serve.
+_ALIKE, _ROUND = 0.03, 0.05
+# A field is its own mirror image from this cosine on.
+_ITSELF = 0.99
 # Where cloth faces an axis by more than this (cosine) it is a base.
 _BASE = 0.6
 # The border of a panel squared is at least this share of a disk's; a cap's is shorter.
 _PANEL = 0.8
-# Limbs are looked for around so many places, far from one another; rings around them are smooth over this share of the size.
-_TIPS, _RING = 16, 0.04
-# In a limb lies the curvature of half a ball, 2 pi, within these shares of pi; its root is the ring in which less than the third is left,
-# and the cloth beyond takes it below the last: the toe of a sock is no limb.
-_THIMBLE, _EXCESS, _ROOT, _SPENT = 1.7, 2.3, 1.5, 0.5
+# Limbs are looked for around so many places, far from one another.
+_TIPS = 16
+# In a limb lies the curvature of half a ball, 2 pi, but for this share of pi; its root is the ring where the second share is lost, and the
+# cloth beyond takes all of it but the second share: the toe of a sock is no limb.
+_OFF, _LOST = 0.3, 0.5
 # The ring around a limb squared is at most this share of a disk's of the limb's area; what is a larger share of the whole is its trunk.
 _LIMB, _TRUNK = 0.35, 0.25
 # Parts at most, and how many more for each limb.
 _MOST, _PER_LIMB = 16, 3
-# A part smaller than this share of the whole is not cut further, and no cut leaves a smaller one.
+# A part smaller than this share of the whole is not cut further, and is a tip where cloth is taken off all around.
 _LEAST = 0.02
-# Mirror images agree within this share of the size; a field is its own mirror image from this cosine on.
-_SAME, _ITSELF = 1e-4, 0.99
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -110,7 +108,7 @@ class LaidFlat:
 
 
 #: Lays a piece of a cloth flat; the third argument is the width from which on nothing is narrow [m].
-Measure = Callable[[Cloth, PieceMesh, float], LaidFlat]
+LayFlat = Callable[[Cloth, PieceMesh, float], LaidFlat]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -124,36 +122,25 @@ class _Way:
 
 def is_open(mesh: PieceMesh) -> bool:
     """Return whether a piece is a disk, or a tube that one cut opens."""
-    loops = len(border_loops(mesh.faces.astype(np.int32)))
-    return loops in (1, 2) and euler_characteristic(mesh.faces.astype(np.int32)) == 2 - loops
-
-
-def _is_disk(mesh: PieceMesh) -> bool:
-    return is_open(mesh) and len(border_loops(mesh.faces.astype(np.int32))) == 1
+    return mesh.shape in ((1, 1), (2, 0))
 
 
 def _is_sewn_inside(cloth: Cloth, mesh: PieceMesh) -> bool:
     """Return whether a piece is a flat ring with a seam around its hole: a pattern has holes, yet sews nothing into them."""
-    local = Cloth(vertices=mesh.vertices, faces=mesh.faces).as_surface()
-    tubes = {int(loop[0]) for loop in tube_borders(local)}
-    seams = np.unique(cloth.seam_edges())
-    return any(
-        int(loop[0]) not in tubes and bool(np.isin(mesh.vertex_of[loop], seams).all())
-        for loop, _ in inner_borders(local)
-    )
+    seams, borders = np.unique(cloth.seam_edges()), inner_borders(mesh.as_surface())
+    return any(turn <= -np.pi and np.isin(mesh.vertex_of[loop], seams).all() for loop, turn in borders)
 
 
 def wide_borders(cloth: Cloth) -> list[float]:
     """Return the lengths of the borders of a cloth that are no holes [m]."""
-    rings = [cloth.vertices[np.append(loop, loop[0])] for loop in cloth.borders()]
-    length = [float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()) for ring in rings]
-    return [one for one in length if one > HOLE * np.sqrt(float(cloth.face_areas.sum()))]
+    lengths = [polyline_length(cloth.vertices[loop], closed=True) for loop in cloth.loops]
+    return [one for one in lengths if one > HOLE * cloth.size]
 
 
 def is_panel(cloth: Cloth) -> bool:
     """Return whether a cloth is one panel: with one border that is about as long as that of a flat disk of its area, or longer."""
     wide = wide_borders(cloth)
-    return len(wide) == 1 and wide[0] ** 2 >= _PANEL * 4.0 * np.pi * float(cloth.face_areas.sum())
+    return len(wide) == 1 and wide[0] ** 2 >= _PANEL * 4.0 * np.pi * cloth.size**2
 
 
 def part_solids(
@@ -162,7 +149,7 @@ def part_solids(
     shape: bool,
     mirror: Anatomy | None = None,
     most: int | None = None,
-    measure: Measure | None = None,
+    measure: LayFlat | None = None,
 ) -> tuple[Cloth, list[str]]:
     """Return the cloth with its pieces cut until each is a disk or a tube, and notes.
 
@@ -196,12 +183,10 @@ def part_solids(
             # What has no pattern, or one that nobody can sew, comes first and last; how many pieces there are is no matter.
             if not is_open(mesh) or _is_sewn_inside(cloth, mesh):
                 rank, value = 2, _strain(mesh, known) * area
-            elif laid is not None and _is_disk(mesh):
+            elif laid is not None and mesh.is_disk:
                 flat = laid(cloth, mesh)
                 beyond += flat.outside * area
-                rank, value = (
-                    (2, flat.overlap) if flat.overlap > _OVERLAP else (1, flat.outside * area - _WORTH * total)
-                )
+                rank, value = (2, flat.overlap) if flat.overlap > OVERLAP else (1, flat.outside * area - _WORTH * total)
             else:
                 rank, value = 1, (_strain(mesh, known) - _FLAT) * area
                 beyond += area if value > 0.0 else 0.0
@@ -243,16 +228,13 @@ def _around_handles(mesh: PieceMesh) -> Ids:
     Of all edges that neither a tree of shortest ways to the border nor a tree of faces uses, two for each handle are left. Each closes
     a way around it with those of its ends (Erickson and Whittlesey, "Greedy optimal homotopy and homology generators", 2005).
     """
-    faces, count = mesh.faces.astype(np.int32), len(mesh.vertices)
-    loops = border_loops(faces, mesh.vertices)
-    none = np.empty((0, 2), np.int64)
-    if not loops or euler_characteristic(faces) == 2 - len(loops):
-        return none
-    he = half_edges(faces)
+    loops, count = mesh.loops, len(mesh.vertices)
+    if not loops or sum(mesh.shape) == 2:
+        return np.empty((0, 2), np.int64)
+    he = mesh.half_edges
     a, b = he.edges.T.astype(np.int64)
-    length = np.maximum(np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1), 1e-12)
-    graph = coo_array((length, (a, b)), shape=(count, count)).tocsr()
-    far, before, _ = dijkstra(graph, directed=False, indices=loops[0], min_only=True, return_predecessors=True)
+    length = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
+    far, before, _ = dijkstra(mesh.graph, directed=False, indices=loops[0], min_only=True, return_predecessors=True)
     inner = np.flatnonzero(before >= 0)
     key = a * count + b
     ways = np.minimum(inner, before[inner]) * count + np.maximum(inner, before[inner])
@@ -267,14 +249,14 @@ def _around_handles(mesh: PieceMesh) -> Ids:
     beside[:, 0] = he.face[order][first]
     double = he.count == 2
     beside[double, 1] = he.face[order][first[double] + 1]
-    beside[~double, 1] = np.where(hole[a[~double]] > 0, len(faces) + hole[a[~double]], -1)
+    beside[~double, 1] = np.where(hole[a[~double]] > 0, len(mesh.faces) + hole[a[~double]], -1)
     free = np.flatnonzero((beside[:, 1] >= 0) & ~np.isin(key, ways))
     # Of several edges between the same two the one with the longest way.
     free = free[np.argsort(-around[free], kind="stable")]
     pairs = np.sort(beside[free], axis=1)
     _, chosen = np.unique(pairs, axis=0, return_index=True)
     weight = 1.0 + around.max() - around[free[chosen]]
-    size = len(faces) + len(loops)
+    size = len(mesh.faces) + len(loops)
     spanning = minimum_spanning_tree(coo_array((weight, tuple(pairs[chosen].T)), shape=(size, size)).tocsr()).tocoo()
     used = np.isin(pairs[chosen] @ [size, 1], spanning.row.astype(np.int64) * size + spanning.col)
     left = np.setdiff1d(free, free[chosen[used]])
@@ -287,59 +269,39 @@ def _around_handles(mesh: PieceMesh) -> Ids:
     return np.array(sorted(found - border), np.int64).reshape(-1, 2)
 
 
-def _image(mesh: PieceMesh, other: PieceMesh, mirror: Anatomy) -> Ids | None:
-    """Return for each vertex of a piece the one of another piece that is its mirror image; None where the other is not its mirror image."""
-    away, nearest = cKDTree(other.vertices).query(mirror.image(mesh.vertices))
-    return nearest if float(away.max()) < _SAME * mirror.size else None
-
-
 def _cut(cloth: Cloth, mesh: PieceMesh, field: FloatArray, name: str, mirror: Anatomy | None) -> Cloth | None:
     """Return the cloth with a piece, and its mirror image, cut along a field's zero line (#V of the piece); None if it is not parted."""
-    own, way = np.zeros(len(cloth.faces), dtype=np.int64), np.zeros(len(cloth.vertices))
-    own[mesh.face_of], way[mesh.vertex_of] = 1, field
+    own, way = np.isin(np.arange(len(cloth.faces)), mesh.face_of), np.zeros(len(cloth.vertices))
+    way[mesh.vertex_of] = field
     keep = 0.01
     for other in cloth.pieces() if mirror is not None else ():
-        image = None if mirror is None or other.face_of[0] == mesh.face_of[0] else _image(other, mesh, mirror)
+        image = None if mirror is None or other.face_of[0] == mesh.face_of[0] else mirror_image(other, mesh, mirror)
         if image is not None:
-            own[other.face_of], way[other.vertex_of] = 1, field[image]
+            own[other.face_of], way[other.vertex_of] = True, field[image]
             # Of both together, an island is half the share.
             keep *= 0.5
             break
-    made = replace(cloth, values={**cloth.values, "way": way}, labels={**cloth.labels, "own": own})
-    made, positive = tidied(made, "way", own > 0, keep=keep).split("way", own > 0)
-    made = made.with_seam(name, made.line_between(positive, made.labels["own"] > 0))
-    values = {key: value for key, value in made.values.items() if key != "way"}
-    labels = {key: label for key, label in made.labels.items() if key != "own"}
-    made = replace(made, values=values, labels=labels)
+    made, _, _, edges = cloth.parted(way, own, keep=keep)
+    made = made.with_seam(name, edges)
     if mirror is not None:
         # Vertices that moved onto the line have moved alike on both sides.
         made, _ = mirrored(made, mirror)
     return made if int(made.parts.max()) > int(cloth.parts.max()) else None
 
 
-def _mirrors_itself(field: FloatArray, image: Ids) -> bool:
-    """Return whether a field is the same, or the negative, at the mirror images of vertices."""
-    other = field[image]
-    return abs(float(field @ other)) > _ITSELF * float(np.linalg.norm(field) * np.linalg.norm(other))
-
-
-def _strain(mesh: PieceMesh | Cloth, known: dict[int, float]) -> float:
+def _strain(mesh: PieceMesh, known: dict[int, float]) -> float:
     """Return about how much a mesh is strained when it is laid flat; `known` remembers it by the hash of its corners."""
-    triangles = mesh.vertices[mesh.faces]
-    corners = hash(triangles.tobytes())
+    corners = hash(mesh.vertices[mesh.faces].tobytes())
     if corners in known:
         return known[corners]
-    a, b, c = triangles.transpose(1, 0, 2)
-    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
-    normals, _ = _smoothed_normals(mesh)
+    normals = _smoothed_normals(mesh)[mesh.faces]
     a, b, c = normals.transpose(1, 0, 2)
     # The solid angle of a triangle of unit vectors, for small ones the triangle's own area.
     curvature = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
-    length = _reach(mesh)
-    for loop in border_loops(mesh.faces.astype(np.int32), mesh.vertices)[1:2]:
+    area, length = float(mesh.face_areas.sum()), _reach(mesh)
+    for loop in mesh.loops[1:2]:
         # A tube is as long, laid flat, as it is around.
-        ring = mesh.vertices[np.append(loop, loop[0])]
-        length = max(length, float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum()))
+        length = max(length, polyline_length(mesh.vertices[loop], closed=True))
     known[corners] = curvature * area / (12.0 * max(length, 1e-300) ** 2)
     return known[corners]
 
@@ -350,36 +312,33 @@ def _limbs(mesh: PieceMesh, mirror: Anatomy | None) -> tuple[FloatArray, int]:
     Rings around a place far out enclose more and more curvature: 2 pi, that of half a ball, at the end of a limb and all along it. Where
     the limb begins the cloth is a saddle, and takes it away again: to 0 on a trunk that is flat (Gauss and Bonnet).
     """
-    operators, graph = Operators(vertices=mesh.vertices, faces=mesh.faces), _graph(mesh)
-    size = float(np.sqrt(operators.mass.sum()))
-    curvature = np.asarray(trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).vertex_defects)
-    loops = border_loops(mesh.faces.astype(np.int32))
-    rim = np.concatenate(loops).astype(np.int64) if loops else np.empty(0, np.int64)
+    size, curvature = mesh.size, mesh.curvature
+    rim = np.unique(mesh.border_edges)
     tips = [int(np.linalg.norm(mesh.vertices - mesh.vertices.mean(axis=0), axis=1).argmax())]
-    away = dijkstra(graph, indices=tips[0])
+    away = dijkstra(mesh.graph, directed=False, indices=tips[0])
     while len(tips) < _TIPS:
         tips.append(int(np.where(np.isfinite(away), away, -1.0).argmax()))
-        away = np.minimum(away, dijkstra(graph, indices=tips[-1]))
+        away = np.minimum(away, dijkstra(mesh.graph, directed=False, indices=tips[-1]))
     heat = np.zeros((len(curvature), _TIPS))
-    heat[tips, np.arange(_TIPS)] = 1.0 / operators.mass[tips]
+    heat[tips, np.arange(_TIPS)] = 1.0 / mesh.mass[tips]
     whole = Cloth(vertices=mesh.vertices, faces=mesh.faces)
     found = list[tuple[float, int, FloatArray]]()
-    for tip, warm in zip(tips, operators.smooth(heat, _RING * size).T, strict=True):
+    for tip, warm in zip(tips, mesh.smooth(heat, _SMOOTH * size).T, strict=True):
         # Varadhan's formula: how heat spreads is how far it is.
-        far = -_RING * size * np.log(np.maximum(warm, 1e-300))
+        far = -_SMOOTH * size * np.log(np.maximum(warm, 1e-300))
         order = np.argsort(far)
         inside = np.cumsum(curvature[order])[: int(np.isin(order, rim).argmax()) if len(rim) else None] / np.pi
-        grown = np.flatnonzero(inside > _THIMBLE)
-        lost = grown[0] + np.flatnonzero(inside[grown[0] :] < _ROOT) if len(grown) else grown
-        if len(lost) == 0 or inside[lost[0] :].min() > _SPENT or np.abs(inside[: lost[0]] - 1.0).max() > _EXCESS - 1.0:
+        grown = np.flatnonzero(inside > 2.0 - _OFF)
+        lost = grown[0] + np.flatnonzero(inside[grown[0] :] < 2.0 - _LOST) if len(grown) else grown
+        if len(lost) == 0 or inside[lost[0] :].min() > _LOST or np.abs(inside[: lost[0]] - 1.0).max() > 1.0 + _OFF:
             continue
         field = far[order[lost[0]]] - far
         length = section(whole, field, np.ones(len(mesh.faces), dtype=bool))[0]
-        area = float(operators.mass[order[: lost[0]]].sum())
+        area = float(mesh.mass[order[: lost[0]]].sum())
         ratio = length**2 / (4.0 * np.pi * area)
         if ratio < _LIMB and 0.3 * _LEAST < area / size**2 < _TRUNK:
             found.append((ratio, tip, field))
-    image = None if mirror is None else _image(mesh, mesh, mirror)
+    image = None if mirror is None else mirror_image(mesh, mesh, mirror)
     taken, count = np.full(len(curvature), -np.inf), 0
     for _, tip, field in sorted(found, key=lambda one: one[0]):
         if taken[tip] > 0.0:
@@ -395,28 +354,16 @@ def _limbs(mesh: PieceMesh, mirror: Anatomy | None) -> tuple[FloatArray, int]:
     return taken, count
 
 
-def _graph(mesh: PieceMesh | Cloth) -> csr_array:
-    a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
-    step = np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
-    graph = coo_array((step, (a, b)), shape=(len(mesh.vertices),) * 2).tocsr()
-    return csr_array(graph.maximum(graph.T))
-
-
-def _reach(mesh: PieceMesh | Cloth) -> float:
+def _reach(mesh: TriangleMesh) -> float:
     """Return the way along a mesh between two places that are about as far from each other as any [m]."""
-    graph = _graph(mesh)
-    far = dijkstra(graph, indices=0)
-    far = dijkstra(graph, indices=int(np.where(np.isfinite(far), far, -1.0).argmax()))
+    far = dijkstra(mesh.graph, directed=False, indices=0)
+    far = dijkstra(mesh.graph, directed=False, indices=int(np.where(np.isfinite(far), far, -1.0).argmax()))
     return float(far[np.isfinite(far)].max())
 
 
-def _smoothed_normals(mesh: PieceMesh | Cloth) -> tuple[FloatArray, FloatArray]:
-    """Return the smoothed normals at the corners of the faces (#F by 3 by 3), and their means (#F by 3)."""
-    operators = Operators(vertices=mesh.vertices, faces=mesh.faces)
-    size = float(np.sqrt(max(float(operators.mass.sum()), 1e-300)))
-    smooth = operators.smooth(operators.vertex_normals, _SMOOTH * size)
-    corners = (smooth / np.maximum(np.linalg.norm(smooth, axis=1, keepdims=True), 1e-300))[mesh.faces]
-    return corners, corners.mean(axis=1)
+def _smoothed_normals(mesh: TriangleMesh) -> FloatArray:
+    """Return the normals of the vertices (#V by 3), smoothed."""
+    return unit(mesh.smooth(mesh.vertex_normals, _SMOOTH * mesh.size))
 
 
 def _ways(mesh: PieceMesh, mirror: Anatomy | None) -> Iterator[_Way]:
@@ -424,10 +371,8 @@ def _ways(mesh: PieceMesh, mirror: Anatomy | None) -> Iterator[_Way]:
 
     With `mirror` it is its own mirror image: an axis that nearly is across the plane of symmetry is taken as that, and cut in the plane.
     """
-    triangles = mesh.vertices[mesh.faces]
-    middles = triangles.mean(axis=1)
-    areas = 0.5 * np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
-    share = areas / areas.sum()
+    middles = mesh.vertices[mesh.faces].mean(axis=1)
+    share = mesh.face_areas / mesh.face_areas.sum()
     centre = share @ middles
     values, vectors = np.linalg.eigh(((middles - centre) * share[:, None]).T @ (middles - centre))
     axes = vectors.T
@@ -438,15 +383,14 @@ def _ways(mesh: PieceMesh, mirror: Anatomy | None) -> Iterator[_Way]:
         # Round about one of its axes: the axis of space that is the farthest from that one, and the one at right angles to both.
         own = axes[2 if same[0] else 0]
         other = np.eye(3)[np.abs(own).argmin()]
-        other = other - (other @ own) * own
-        other /= np.linalg.norm(other)
+        other = unit(other - (other @ own) * own)
         round_ones = [other, np.cross(own, other)]
         axes = np.array([*round_ones, own] if same[0] else [own, *round_ones])
     # Axes that nearly are those of space are taken as these: a garment is drawn upright.
     axes = np.array(
         [
             np.sign(axis[np.abs(axis).argmax()]) * np.eye(3)[np.abs(axis).argmax()]
-            if np.abs(axis).max() > _NEARLY
+            if np.abs(axis).max() > SAME_WAY
             else axis
             for axis in axes
         ]
@@ -454,18 +398,18 @@ def _ways(mesh: PieceMesh, mirror: Anatomy | None) -> Iterator[_Way]:
     fields = (mesh.vertices - centre) @ axes.T
     if mirror is not None:
         k = int(np.abs(axes @ mirror.normal).argmax())
-        if abs(float(axes[k] @ mirror.normal)) > _NEARLY:
+        if abs(float(axes[k] @ mirror.normal)) > SAME_WAY:
             axes[k], fields[:, k] = mirror.normal, mesh.vertices @ mirror.normal - mirror.offset
     # To the nanometre: on which side a vertex in the plane of symmetry lies is not for rounding to say.
     fields = np.round(fields, 9)
     for k in (1, 2, 0):
         yield _Way(field=fields[:, k], name="across", round=bool(same.any()))
-    _, normals = _smoothed_normals(mesh)
-    weight = np.maximum(np.bincount(mesh.faces.ravel(), np.repeat(areas, 3), minlength=len(mesh.vertices)), 1e-300)
+    normals = _smoothed_normals(mesh)[mesh.faces].mean(axis=1)
     for axis in axes:
-        facing = np.bincount(mesh.faces.ravel(), np.repeat(areas * (normals @ axis), 3), minlength=len(mesh.vertices))
+        weight = np.repeat(mesh.face_areas * (normals @ axis) / 3.0, 3)
+        facing = np.bincount(mesh.faces.ravel(), weight, minlength=len(mesh.vertices)) / mesh.mass
         for sign in (1.0, -1.0):
-            yield _Way(field=sign * facing / weight - _BASE, name="base", round=bool(same.any()))
+            yield _Way(field=sign * facing - _BASE, name="base", round=bool(same.any()))
 
 
 def _key(mesh: PieceMesh, area: float) -> tuple[int, float]:
@@ -473,7 +417,7 @@ def _key(mesh: PieceMesh, area: float) -> tuple[int, float]:
     return len(mesh.face_of), round(area, 9)
 
 
-def _remembering(measure: Measure, width: float) -> Callable[[Cloth, PieceMesh], LaidFlat]:
+def _remembering(measure: LayFlat, width: float) -> Callable[[Cloth, PieceMesh], LaidFlat]:
     """Return a measure that lays pieces that are alike flat once."""
     known: dict[tuple[int, float], LaidFlat] = {}
 
@@ -495,18 +439,19 @@ def _best_way(
     neck: FloatArray | None,
 ) -> FloatArray | None:
     """Return the field (#V) along whose zero line a part is cut so that the least is left to do; None if no cut parts it well."""
-    image = None if mirror is None else _image(mesh, mesh, mirror)
+    image = None if mirror is None else mirror_image(mesh, mesh, mirror)
     found = list[tuple[float, Cloth, FloatArray]]()
     for way in _ways(mesh, None if image is None else mirror) if neck is None else [_across_neck(mesh, neck)]:
-        if image is not None and not _mirrors_itself(way.field, image):
-            if neck is None:
+        if image is not None:
+            other = way.field[image]
+            alike = abs(float(way.field @ other)) > _ITSELF * float(np.linalg.norm(way.field) * np.linalg.norm(other))
+            if neck is None and not alike:
                 continue
-            # At both of its necks.
-            way = replace(way, field=np.maximum(way.field, way.field[image]))
-        local = Cloth(vertices=mesh.vertices, faces=mesh.faces, values={"way": way.field})
-        everywhere = np.ones(len(local.faces), dtype=bool)
-        made, positive = tidied(local, "way", everywhere, keep=0.05).split("way", everywhere)
-        edges = made.line_between(positive, np.ones(len(made.faces), dtype=bool))
+            if not alike:
+                # At both of its necks.
+                way = replace(way, field=np.maximum(way.field, other))
+        local = Cloth(vertices=mesh.vertices, faces=mesh.faces)
+        made, _, _, edges = local.parted(way.field, np.ones(len(local.faces), dtype=bool), keep=0.05)
         if len(edges) == 0:
             continue
         made = made.with_seam("way", edges)
@@ -514,8 +459,8 @@ def _best_way(
         areas = [float(made.face_areas[part.face_of].sum()) for part in parts]
         if len(parts) == 1 or min(areas) < 0.3 * _LEAST * total:
             continue
-        cost = _SEAM * made.seam_length("way") / np.sqrt(sum(areas)) + sum(_topology(part.faces) for part in parts)
-        cost += _UNLIKE * way.round * (max(areas) > (1.0 + _ALIKE) * min(areas))
+        cost = _SEAM * made.seam_length("way") / np.sqrt(sum(areas)) + sum(_topology(part) for part in parts)
+        cost += _SEAM * way.round * (max(areas) > (1.0 + _ALIKE) * min(areas))
         cost += sum(_strain(part, known) * area for part, area in zip(parts, areas, strict=True)) / sum(areas)
         found.append((cost, made, way.field))
     best: tuple[float, FloatArray] | None = None
@@ -523,9 +468,9 @@ def _best_way(
         if best is not None and best[0] <= cost:
             break
         if laid is not None:
-            disks = [laid(made, part) for part in made.pieces() if _is_disk(part)]
+            disks = [laid(made, part) for part in made.pieces() if part.is_disk]
             # What lies over itself has no width: where it is narrowest hangs on rounding.
-            widths = [flat.width for flat in disks if flat.overlap <= _OVERLAP]
+            widths = [flat.width for flat in disks if flat.overlap <= OVERLAP]
             cost += _THIN * max(1.0 - min(widths, default=np.inf) / (NARROW * np.sqrt(total)), 0.0)
         if best is None or cost < best[0]:
             best = cost, field
@@ -534,24 +479,20 @@ def _best_way(
 
 def _across_neck(mesh: PieceMesh, neck: FloatArray) -> _Way:
     """Return the way of cutting a part at its neck and nowhere else, in the plane through its ends that is at right angles to the cloth."""
-    middle, points = neck.mean(axis=0), mesh.vertices
-    triangles = points[mesh.faces]
-    near = np.linalg.norm(triangles.mean(axis=1) - middle, axis=1) < max(np.linalg.norm(neck[1] - neck[0]), 2e-3)
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    middle, points, normals = neck.mean(axis=0), mesh.vertices, mesh.area_vectors
+    away = np.linalg.norm(points[mesh.faces].mean(axis=1) - middle, axis=1)
+    near = away < max(np.linalg.norm(neck[1] - neck[0]), 2e-3)
     along = np.cross(neck[1] - neck[0], normals[near].sum(axis=0) if near.any() else normals.sum(axis=0))
-    field = (points - middle) @ along / max(float(np.linalg.norm(along)), 1e-300)
+    field = (points - middle) @ unit(along)
     # Of what lies beyond the plane, only the part at the neck.
-    a, b = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
-    passed = (field[a] > 0.0) & (field[b] > 0.0)
-    label = join_labels(len(points), a[passed], b[passed])
     ahead = np.flatnonzero(field > 0.0)
     if len(ahead):
-        own = label == label[ahead[np.linalg.norm(points[ahead] - middle, axis=1).argmin()]]
-        field = np.where(own, field, -np.abs(field))
+        first = ahead[np.linalg.norm(points[ahead] - middle, axis=1).argmin()]
+        field = np.where(mesh.reached(field > 0.0, np.array([first])), field, -np.abs(field))
     return _Way(field=field, name="neck", round=False)
 
 
-def parts_within(faces: IntArray, flat: FloatArray, width: float, tip: float = _TIP) -> int:
+def parts_within(faces: IntArray, flat: FloatArray, width: float, tip: float = _LEAST) -> int:
     """Return in how many parts a pattern falls with half a width [m] taken off all around; 0 where nothing is left.
 
     Tips, which are no more than a share of the whole, are no parts.
@@ -563,10 +504,10 @@ def parts_within(faces: IntArray, flat: FloatArray, width: float, tip: float = _
     return int((shapely.area(shapely.get_parts(whole.buffer(-0.5 * width))) > tip * whole.area).sum())
 
 
-def _topology(faces: Ids) -> float:
+def _topology(mesh: PieceMesh) -> float:
     """Return what it costs that a part is no disk: a tube needs one cut, anything else more."""
-    loops = len(border_loops(faces.astype(np.int32)))
+    loops, euler = mesh.shape
     if loops == 0:
         return 1.0
-    holes = 2 - euler_characteristic(faces.astype(np.int32)) - 1
+    holes = 1 - euler
     return 0.01 * min(holes, 1) + 0.2 * max(holes - 1, 0)

@@ -2,47 +2,42 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from warpflat.core import FloatArray
-from warpflat.flat import border_loops, euler_characteristic
+from warpflat.core import FloatArray, other_side, project_on_segments
 from warpflat.garment.seams.anatomy import Anatomy
-from warpflat.garment.seams.cloth import Cloth, edge_components
-from warpflat.garment.seams.fields import Operators
+from warpflat.garment.seams.cloth import BESIDE_LINE, FACES, LEVELS, Cloth, PieceMesh, are_among, edge_components
 
-__all__ = ["averaged", "mirrored", "other_side"]
+__all__ = ["SAME_PLACE", "averaged", "mirror_image", "mirrored"]
 
 Ids = NDArray[np.int64]
 
 # Lengths are shares of the garment's size, the square root of its area.
+#: Vertices are at one place within this.
+SAME_PLACE = 1e-5
 # Cloth is averaged if its mirror image lies as near as this, in the mean and at all but a hundredth of its vertices: half of this it moves.
 _MEAN, _FARTHEST = 0.01, 0.035
-# The move of the cloth fades over this where a border moves by more.
-_FADE = 0.05
-# Cloth crosses the plane where the way over it leads across by this (cosine).
-_STEEP = 0.5
 # A seam that keeps so near to the plane of symmetry is in it.
 _IN_PLANE = 0.008
-# Cloth that is so far from the plane, as a share of what is the farthest at its height, one of so many levels, is of its side.
-_FAR, _LEVELS = 0.5, 32
+# Cloth that is so far from the plane, as a share of what is the farthest at its height, is of its side.
+_FAR = 0.5
 # What is mirrored has the area of what it was made from within this: sides that lie as near as that to each other differ by wrinkles.
 _SAME_AREA = 0.05
 # Cloth that moves by less is not worth a word [m].
 _TOLD = 5e-4
-# The name of the field between the sides.
-_ACROSS = "across"
 
 
-def other_side(name: str) -> str:
-    """Return a seam's name with left and right changed."""
-    return re.sub(r"\b(left|right)\b", lambda word: "right" if word[0] == "left" else "left", name)
+def mirror_image(mesh: PieceMesh, other: PieceMesh, anatomy: Anatomy) -> Ids | None:
+    """Return for each vertex of a piece the one of another piece that is its mirror image; None where the other is not its mirror image."""
+    away, nearest = cKDTree(other.vertices).query(anatomy.image(mesh.vertices))
+    return nearest if float(away.max()) < SAME_PLACE * anatomy.size else None
 
 
-def averaged(cloth: Cloth, anatomy: Anatomy, operators: Operators) -> tuple[Cloth, str, bool]:
+def averaged(cloth: Cloth, anatomy: Anatomy) -> tuple[Cloth, str, bool]:
     """Return the cloth with both sides moved half way to each other, how far in words, and true; as it was where they differ too much.
 
     Borders move to the mirror images of borders: a sleeve that is longer by a centimetre becomes half a centimetre shorter.
@@ -71,10 +66,10 @@ def averaged(cloth: Cloth, anatomy: Anatomy, operators: Operators) -> tuple[Clot
         held = np.concatenate(fixed)
         gap[held] = np.concatenate(given)
         gap = np.stack(
-            [operators.solve(held, column[held], data=column, length=_FADE * size) for column in gap.T], axis=1
+            [cloth.solve(held, column[held], data=column, length=BESIDE_LINE * size) for column in gap.T], axis=1
         )
     away = np.linalg.norm(gap, axis=1)
-    share = operators.mass / operators.mass.sum()
+    share = cloth.mass / cloth.mass.sum()
     if float(share @ away) > _MEAN * size or float(np.quantile(away, 0.99)) > _FARTHEST * size:
         return cloth, apart, False
     moved = 0.5 * away
@@ -84,11 +79,11 @@ def averaged(cloth: Cloth, anatomy: Anatomy, operators: Operators) -> tuple[Clot
 
 def _nearest_on_loop(loop: FloatArray, points: FloatArray) -> FloatArray:
     """Return the points of a closed line (#L by 3) that are nearest to others (#P by 3)."""
-    a, way = loop, np.roll(loop, -1, axis=0) - loop
-    t = np.einsum("plk,lk->pl", points[:, None] - a, way) / np.maximum((way**2).sum(axis=1), 1e-300)
-    foot = a + np.clip(t, 0.0, 1.0)[:, :, None] * way
-    nearest = np.linalg.norm(foot - points[:, None], axis=2).argmin(axis=1)
-    return np.asarray(foot[np.arange(len(points)), nearest])
+    following = np.roll(loop, -1, axis=0)
+    share, away = project_on_segments(points[:, None], loop, following)
+    nearest = away.argmin(axis=1)
+    at = share[np.arange(len(points)), nearest][:, None]
+    return np.asarray((1.0 - at) * loop[nearest] + at * following[nearest])
 
 
 def mirrored(cloth: Cloth, anatomy: Anatomy) -> tuple[Cloth, str]:
@@ -101,50 +96,38 @@ def mirrored(cloth: Cloth, anatomy: Anatomy) -> tuple[Cloth, str]:
         return cloth, "it has no plane of symmetry"
     if lone := sorted(name for name in cloth.seams if other_side(name) not in cloth.seams):
         return cloth, f"{lone[0]} is on one side alone"
-    normal, offset, size = anatomy.normal, anatomy.offset, anatomy.size
-    split, left = replace(cloth, values={**cloth.values, _ACROSS: _between_sides(cloth, anatomy)}).split(
-        _ACROSS, np.ones(len(cloth.faces), dtype=bool)
-    )
+    split = cloth.with_values(across=_between_sides(cloth, anatomy))
+    split, left, _ = split.split("across", np.ones(len(cloth.faces), dtype=bool))
     if not left.any() or left.all():
         return cloth, "one side has no cloth"
-    used, place = np.unique(split.faces[left], return_inverse=True)
-    faces = place.reshape(-1, 3).astype(np.int64)
-    half = split.vertices[used]
-    height = half @ normal - offset
-    middle = np.flatnonzero(split.values[_ACROSS][used] == 0.0)
-    still = np.zeros(len(half))
-    moved = Operators(vertices=half, faces=faces).solve(middle, -height[middle], data=still, length=_FADE * size)
-    height = height + moved
-    height[middle] = 0.0
-    half = half + (height - (half @ normal - offset))[:, None] * normal
-    off = np.setdiff1d(np.arange(len(used)), middle)
-    twin = np.arange(len(used))
-    twin[off] = len(used) + np.arange(len(off))
-    place_of = np.full(len(split.vertices), -1, dtype=np.int64)
-    place_of[used] = np.arange(len(used))
-    rim = np.unique(np.sort(np.concatenate([faces[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1), axis=0)
-    known = rim[:, 0] * len(used) + rim[:, 1]
+    half = split.only(left)
+    height, count = anatomy.across(half.vertices), len(half.vertices)
+    middle = np.flatnonzero(half.values["across"] == 0.0)
+    level = height + half.solve(middle, -height[middle], data=np.zeros(count), length=BESIDE_LINE * anatomy.size)
+    level[middle] = 0.0
+    vertices = half.vertices + (level - height)[:, None] * anatomy.normal
+    off = np.setdiff1d(np.arange(count), middle)
+    twin = np.arange(count)
+    twin[off] = count + np.arange(len(off))
     seams: dict[str, Ids] = {}
-    for name, edges in split.seams.items():
-        own = np.sort(place_of[edges], axis=1)
-        own = own[(own >= 0).all(axis=1)]
-        own = own[np.isin(own[:, 0] * len(used) + own[:, 1], known)]
-        for title, rows in ((name, own), (other_side(name), np.sort(twin[own], axis=1))):
+    for name, edges in half.seams.items():
+        for title, rows in ((name, edges), (other_side(name), np.sort(twin[edges], axis=1))):
             if len(rows):
                 seams[title] = np.unique(np.concatenate([seams[title], rows]) if title in seams else rows, axis=0)
-    mates = _sleeve_mates(anatomy)
     values = {
-        name: np.concatenate([value[used], (-1.0 if name == "left" else 1.0) * value[used][off]])
-        for name, value in split.values.items()
-        if name != _ACROSS
+        name: np.concatenate([value, (-1.0 if name == "left" else 1.0) * value[off]])
+        for name, value in half.values.items()
+        if name != "across"
     }
+    sleeves = anatomy.limbs_of("sleeve")
+    mates = {sleeves.index(one): sleeves.index(mate) for one in sleeves if (mate := anatomy.mate(one)) is not None}
     labels = {}
-    for name, label in split.labels.items():
-        image = np.array([mates.get(int(one), int(one)) for one in label[left]]) if name == "sleeve" else label[left]
-        labels[name] = np.concatenate([label[left], image])
+    for name, label in half.labels.items():
+        image = np.array([mates.get(int(one), int(one)) for one in label]) if name == "sleeve" else label
+        labels[name] = np.concatenate([label, image])
     made = Cloth(
-        vertices=np.concatenate([half, anatomy.image(half[off])]),
-        faces=np.concatenate([faces, twin[faces][:, ::-1]]),
+        vertices=np.concatenate([vertices, anatomy.image(vertices[off])]),
+        faces=np.concatenate([half.faces, twin[half.faces][:, ::-1]]),
         values=values,
         labels=labels,
         seams=seams,
@@ -158,15 +141,12 @@ def _between_sides(cloth: Cloth, anatomy: Anatomy) -> FloatArray:
 
     It is 0 along seams in the plane.
     """
-    operators = Operators(vertices=cloth.vertices, faces=cloth.faces)
-    lateral = cloth.vertices @ anatomy.normal - anatomy.offset
+    lateral = anatomy.across(cloth.vertices)
     heights = cloth.vertices @ anatomy.up
-    level = np.clip(
-        ((heights - heights.min()) / max(np.ptp(heights), 1e-300) * _LEVELS).astype(np.int64), 0, _LEVELS - 1
-    )
-    farthest = np.zeros(_LEVELS)
+    level = np.clip(((heights - heights.min()) / max(np.ptp(heights), 1e-300) * LEVELS).astype(np.int64), 0, LEVELS - 1)
+    farthest = np.zeros(LEVELS)
     np.maximum.at(farthest, level, np.abs(lateral))
-    far = np.flatnonzero(np.abs(lateral) > np.maximum(_FAR * farthest[level], _FADE * anatomy.size))
+    far = np.flatnonzero(np.abs(lateral) > np.maximum(_FAR * farthest[level], BESIDE_LINE * anatomy.size))
     edges = cloth.half_edges.edges.astype(np.int64)
     # Where edges lie in the plane but for rounding, and along seams that keep near to it.
     exact = edges[(np.abs(lateral[edges]) < 1e-6 * anatomy.size).all(axis=1)]
@@ -175,7 +155,7 @@ def _between_sides(cloth: Cloth, anatomy: Anatomy) -> FloatArray:
     while True:
         inner = np.setdiff1d(np.concatenate([np.empty(0, dtype=np.int64), *(part.ravel() for part in parts)]), far)
         fixed = np.concatenate([far, inner])
-        field = operators.solve(fixed, np.concatenate([lateral[far], np.zeros(len(inner))]))
+        field = cloth.solve(fixed, np.concatenate([lateral[far], np.zeros(len(inner))]))
         # One that has the same side of the garment on both of its sides is not in it.
         between = [part for part in parts if _changes_sign(cloth, field, part)]
         if len(between) == len(parts):
@@ -183,19 +163,17 @@ def _between_sides(cloth: Cloth, anatomy: Anatomy) -> FloatArray:
         parts = between
     plain = np.setdiff1d(_plainly_across(cloth, field, lateral, anatomy), fixed)
     given = np.concatenate([lateral[far], np.zeros(len(inner)), lateral[plain]])
-    return operators.solve(np.concatenate([fixed, plain]), given)
+    return cloth.solve(np.concatenate([fixed, plain]), given)
 
 
 def _plainly_across(cloth: Cloth, field: FloatArray, lateral: FloatArray, anatomy: Anatomy) -> Ids:
     """Return the vertices near the plane of symmetry in whose surroundings the cloth is steep to it, and goes as a field (#V) rises."""
-    from scipy.spatial import cKDTree
-
-    near = _FADE * anatomy.size
+    near = BESIDE_LINE * anatomy.size
     corners, normals = cloth.vertices[cloth.faces], cloth.face_normals
     # Of a linear function, by the edges opposite to the corners, each turned by a right angle.
     turned = np.cross(normals[:, None], np.roll(corners, 1, axis=1) - np.roll(corners, -1, axis=1))
     rise = np.einsum("fk,fka->fa", field[cloth.faces], turned)
-    across = rise @ anatomy.normal > _STEEP * np.linalg.norm(rise, axis=1)
+    across = rise @ anatomy.normal > FACES * np.linalg.norm(rise, axis=1)
     other = (np.abs(lateral[cloth.faces]).min(axis=1) < 2.0 * near) & ~across
     away = np.full(len(lateral), np.inf)
     if other.any():
@@ -205,23 +183,11 @@ def _plainly_across(cloth: Cloth, field: FloatArray, lateral: FloatArray, anatom
 
 def _changes_sign(cloth: Cloth, field: FloatArray, line: Ids) -> bool:
     """Return whether a field (#V) has different signs on both sides of most of a line's edges (#E by 2)."""
-    he, stride = cloth.half_edges, np.int64(len(cloth.vertices))
-    own = np.sort(line, axis=1)
-    key = he.edges[:, 0] * stride + he.edges[:, 1]
-    beside = np.flatnonzero(np.isin(key, own[:, 0] * stride + own[:, 1])[he.edge])
+    he = cloth.half_edges
+    beside = np.flatnonzero(are_among(he.edges, line)[he.edge])
     third = cloth.faces[he.face[beside]].sum(axis=1) - he.tail[beside] - he.head[beside]
     left, right = (np.unique(he.edge[beside[chosen]]) for chosen in (field[third] > 0.0, field[third] < 0.0))
-    return 2 * len(np.intersect1d(left, right)) > len(own)
-
-
-def _sleeve_mates(anatomy: Anatomy) -> dict[int, int]:
-    limbs = anatomy.limbs_of("sleeve")
-    return {
-        number: other
-        for number, limb in enumerate(limbs)
-        for other, mate in enumerate(limbs)
-        if mate.side == -limb.side
-    }
+    return 2 * len(np.intersect1d(left, right)) > len(line)
 
 
 def _unlike(made: Cloth, cloth: Cloth) -> str:
@@ -231,12 +197,5 @@ def _unlike(made: Cloth, cloth: Cloth) -> str:
     areas = [float(one.face_areas.sum()) for one in (made, cloth)]
     if abs(areas[0] - areas[1]) > _SAME_AREA * areas[1]:
         return "one side has more cloth than the other"
-    shapes = []
-    for one in (made, cloth):
-        whole = len(one.borders()), euler_characteristic(one.faces.astype(np.int32))
-        pieces = sorted(
-            (len(border_loops(mesh.faces.astype(np.int32))), euler_characteristic(mesh.faces.astype(np.int32)))
-            for mesh in one.pieces()
-        )
-        shapes.append((whole, pieces))
+    shapes = [(one.shape, sorted(mesh.shape for mesh in one.pieces())) for one in (made, cloth)]
     return "" if shapes[0] == shapes[1] else "one side has openings, seams or pieces that the other has not"

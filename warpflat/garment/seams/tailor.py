@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, FloatArray, reflected
-from warpflat.flat import components, join_labels
-from warpflat.garment.seams.anatomy import Anatomy, Limb
-from warpflat.garment.seams.cloth import Cloth, edge_components, section
-from warpflat.garment.seams.fields import Operators
+from warpflat.core import BoolArray, FloatArray, reflected, unit
+from warpflat.flat import border_loops, components
+from warpflat.garment.seams.anatomy import FROM_SHOULDERS, Anatomy, Limb
+from warpflat.garment.seams.cloth import FACES, ISLAND, LEVELS, Cloth, edge_components, section
 
 __all__ = [
     "BESIDE",
     "FACING",
     "LEFT",
-    "TAILORED",
-    "Fields",
+    "centre_lines",
     "cut_as_a_tailor",
     "draw_fields",
     "side_word",
-    "tidied",
     "with_drawn_sleeves",
 ]
 
@@ -31,46 +27,27 @@ Ids = NDArray[np.int64]
 
 # Lengths are shares of the garment's size, the square root of its area.
 # Wrinkles that are shorter than some three of these do not bend a seam.
-_SMOOTH, _SCREEN = 0.035, 0.07
-# The cloth at the plane of symmetry faces to the front or the back by at least this (cosine); between, at a crotch, it does neither.
-_FACES = 0.5
+_SMOOTH = 0.035
 # The armhole leans outwards towards the shoulder by this [rad]: a body is wider there than at the armpit.
 _LEAN = np.radians(8.0)
-# The armhole runs outside of the armpit by this, and by more where it would not close around the sleeve.
-_OUTSIDE, _STEP, _STEPS = 0.004, 0.008, 12
+# The armhole is looked for in such steps outwards, from half of one outside of the armpit.
+_STEP = 0.008
 # Where it closes around the sleeve only so much farther outside, it ends at the neck, of which the sleeve then has a share.
 _BARE = 0.05
 # Its length falls by no more than this over the way outwards once it runs around the sleeve.
 _STEEP = 3.0
 # Nor does its plane follow an arm further than this: one that hangs, and one that is raised.
 _HANGS, _RAISED = np.radians(-4.0), np.radians(30.0)
-# Levels between armpits and crown; a hood is wider, across its opening, than the neck below it by this, and the shoulders are by more. It
+# A hood is wider, across its opening, than the neck below it by this, and the shoulders are by more. It
 # has such a share of the cloth, and its opening goes up by at least this share of its height.
-_LEVELS, _WIDER, _ROOT, _SHOULDERS, _HOOD, _FACE = 25, 1.1, 1.35, 1.5, (0.05, 0.4), 0.5
+_WIDER, _ROOT, _SHOULDERS, _HOOD, _FACE = 1.1, 1.35, 1.5, (0.05, 0.4), 0.5
 #: A line that the user has drawn is meant where a tailor would have cut within this.
 BESIDE = 0.08
 # A sleeve has no more than this share of the neck, or of the opening.
 _NECK = 0.35
-# An island of the other sign of less than this share of its part is a wrinkle.
-_ISLAND = 0.06
 
-#: Kinds of garments that a tailor knows how to cut.
-TAILORED = ("top", "dress", "skirt", "trousers", "jumpsuit")
 #: The field that is positive in front, the one that is positive on the left, and those that are positive in a sleeve.
 FACING, LEFT = "front", "left"
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Fields:
-    """The cloth with its fields, and the normals by which they were drawn.
-
-    Attributes:
-        cloth: with values "front", "left", and "sleeve 0" and so on.
-        sleeves: the limb of each sleeve's field.
-    """
-
-    cloth: Cloth
-    sleeves: Mapping[str, Limb]
 
 
 def side_word(side: float) -> str:
@@ -78,40 +55,31 @@ def side_word(side: float) -> str:
     return "left" if side > 0 else "right"
 
 
-def draw_fields(cloth: Cloth, anatomy: Anatomy, operators: Operators) -> Fields:
-    """Draw the fields whose zero lines are seams, symmetric where the garment is."""
+def draw_fields(cloth: Cloth, anatomy: Anatomy) -> Cloth:
+    """Return the cloth with the fields whose zero lines are seams: front, left, "sleeve 0" and so on; symmetric where the garment is."""
     size, mirror = anatomy.size, anatomy.mirror
-    normal = operators.smooth(operators.vertex_normals, _SMOOTH * size)
+    normal = cloth.smooth(cloth.vertex_normals, _SMOOTH * size)
     facing = normal @ anatomy.front / np.maximum(np.linalg.norm(normal, axis=1), 1e-3)
     armholes = _armhole_fields(cloth, anatomy)
-    facing = _around_limbs(facing, cloth, anatomy, operators, armholes)
-    lateral = cloth.vertices @ anatomy.normal - anatomy.offset
-    sides = {side: [limb for limb in anatomy.borders if limb.side == side] for side in (1, -1)}
-    left = lateral
-    if sides[1] and sides[-1]:
-        fixed = {side: np.concatenate([border.vertices for border in sides[side]]) for side in (1, -1)}
-        given = np.concatenate([np.full(len(fixed[1]), 1.0), np.full(len(fixed[-1]), -1.0)])
-        left = operators.solve(np.concatenate([fixed[1], fixed[-1]]), given)
+    facing = _around_limbs(facing, cloth, anatomy, armholes)
+    left = anatomy.across(cloth.vertices)
+    beside = [border for border in anatomy.borders if border.side]
+    if {border.side for border in beside} == {1, -1}:
+        given = np.concatenate([np.full(len(border.vertices), float(border.side)) for border in beside])
+        left = cloth.solve(np.concatenate([border.vertices for border in beside]), given)
         left = left if mirror is None else mirror.symmetrised(left, -1.0)
     # The cloth at the centre lines is wholly in front, or wholly behind.
-
     changes = (left[cloth.faces].min(axis=1) < 0.0) & (left[cloth.faces].max(axis=1) >= 0.0)
     centre = np.unique(cloth.faces[changes])
-    centre = centre[np.abs(facing[centre]) > _FACES]
-    front = operators.solve(centre, np.sign(facing[centre]), data=facing, length=_SCREEN * size)
+    # Between, at a crotch, it faces neither way.
+    centre = centre[np.abs(facing[centre]) > FACES]
+    front = cloth.solve(centre, np.sign(facing[centre]), data=facing, length=2.0 * _SMOOTH * size)
     front = front if mirror is None else mirror.symmetrised(front)
-    values = {**cloth.values, FACING: front, LEFT: left}
-    sleeves = {}
-    for number, limb in enumerate(anatomy.limbs_of("sleeve")):
-        if number in armholes:
-            values[f"sleeve {number}"] = armholes[number]
-            sleeves[f"sleeve {number}"] = limb
-    return Fields(cloth=replace(cloth, values=values), sleeves=sleeves)
+    sleeves = {f"sleeve {number}": field for number, field in armholes.items()}
+    return cloth.with_values(**{FACING: front, LEFT: left}, **sleeves)
 
 
-def _around_limbs(
-    facing: FloatArray, cloth: Cloth, anatomy: Anatomy, operators: Operators, armholes: Mapping[int, FloatArray]
-) -> FloatArray:
+def _around_limbs(facing: FloatArray, cloth: Cloth, anatomy: Anatomy, armholes: Mapping[int, FloatArray]) -> FloatArray:
     """Return how far vertices face to the front; along sleeves and legs by their place around the axis, which wrinkles do not turn."""
     made = facing.copy()
     sleeves = anatomy.limbs_of("sleeve")
@@ -119,17 +87,15 @@ def _around_limbs(
     regions += [(limb, (limb.fork - cloth.vertices) @ anatomy.up) for limb in anatomy.limbs_of("leg")]
     for limb, beyond in regions:
         rim = anatomy.borders[limb.border].vertices
-        own = _reached(cloth.faces, beyond > 0.0, rim)
+        own = cloth.reached(beyond > 0.0, rim)
         others = np.flatnonzero(~own)
         if len(others) == 0 or own.sum() < 30:
             continue
-        along = operators.solve(
-            np.concatenate([rim, others]), np.concatenate([np.ones(len(rim)), np.zeros(len(others))])
-        )
+        along = cloth.solve(np.concatenate([rim, others]), np.concatenate([np.ones(len(rim)), np.zeros(len(others))]))
         # The middle of each of some rings, as a smooth curve.
         count = int(np.clip(own.sum() // 40, 4, 24))
         order = np.flatnonzero(own)[np.argsort(along[own], kind="stable")]
-        mass = operators.mass[order]
+        mass = cloth.mass[order]
         ring = np.minimum((np.cumsum(mass) / mass.sum() * count).astype(np.int64), count - 1)
         total = np.maximum(np.bincount(ring, mass, minlength=count), 1e-300)
         at = np.bincount(ring, mass * along[order], minlength=count) / total
@@ -140,13 +106,11 @@ def _around_limbs(
         curve = np.polynomial.polynomial.polyfit(at, middle, degree)
         tangent = np.polynomial.polynomial.polyder(curve)
         t = np.clip(along[own], at.min(), at.max())
-        way = np.polynomial.polynomial.polyval(t, tangent).T
-        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-300)
+        way = unit(np.asarray(np.polynomial.polynomial.polyval(t, tangent).T, dtype=np.float64))
         off = cloth.vertices[own] - np.polynomial.polynomial.polyval(t, curve).T
         off -= np.einsum("ij,ij->i", off, way)[:, None] * way
-        place = off @ anatomy.front / np.maximum(np.linalg.norm(off, axis=1), 1e-300)
         weight = np.clip(4.0 * along[own], 0.0, 1.0)
-        made[own] = (1.0 - weight) * facing[own] + weight * place
+        made[own] = (1.0 - weight) * facing[own] + weight * (unit(off) @ anatomy.front)
     return made
 
 
@@ -172,7 +136,8 @@ def _armhole_fields(cloth: Cloth, anatomy: Anatomy) -> dict[int, FloatArray]:
                 break
             along = way / np.linalg.norm(way)
     for number, limb in enumerate(limbs):
-        mate = next((k for k, other in enumerate(limbs) if other.side == -limb.side), None)
+        other_limb = anatomy.mate(limb)
+        mate = None if other_limb is None else limbs.index(other_limb)
         if limb.side > 0 and mate is not None and {number, mate} <= found.keys() and anatomy.mirror is not None:
             # Both planes become the mean of one and the mirror image of the other, if these are much the same.
             (one, at), (other, there) = found[number], found[mate]
@@ -194,14 +159,13 @@ def _facing_of_armhole(anatomy: Anatomy, limb: Limb, along: FloatArray) -> Float
     It turns forwards with an arm as far as that is raised: a shoulder does. A sleeve that hangs is set forwards in its armhole.
     """
     outwards, up = limb.side * anatomy.normal, anatomy.up
-    outwards = outwards - (outwards @ up) * up
-    outwards /= np.linalg.norm(outwards)
+    outwards = unit(outwards - (outwards @ up) * up)
     half = outwards + along
     rise = np.clip(np.arctan2(half @ up, max(float(half @ outwards), 1e-3)), _HANGS, _RAISED)
     level = half - (half @ up) * up
     level -= (1.0 - max(rise / _RAISED, 0.0)) * (level - (level @ outwards) * outwards)
     angle = rise - _LEAN
-    return np.asarray(np.cos(angle) * level / max(float(np.linalg.norm(level)), 1e-300) + np.sin(angle) * up)
+    return np.asarray(np.cos(angle) * unit(level) + np.sin(angle) * up)
 
 
 def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> tuple[float, FloatArray] | None:
@@ -212,8 +176,8 @@ def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> 
     lengths, middles, offsets = list[float](), list[FloatArray](), list[float]()
     bare: tuple[float, FloatArray] | None = None
     for number in range(60):
-        offset = _OUTSIDE * anatomy.size + number * step
-        beyond = _reached(cloth.faces, height > offset, rim)
+        offset = (number + 0.5) * step
+        beyond = cloth.reached(height > offset, rim)
         if offset >= height[rim].min():
             break
         shares = [float(beyond[border.vertices].mean()) for border in others]
@@ -235,13 +199,26 @@ def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> 
     return (offsets[0], middles[0]) if offsets else bare
 
 
-def cut_as_a_tailor(fields: Fields, anatomy: Anatomy, *, hood: bool = True) -> tuple[Cloth, list[str]]:
+def _sleeves(cloth: Cloth, anatomy: Anatomy) -> Iterator[tuple[int, str, Limb]]:
+    """Yield the number, the field and the limb of each sleeve that has one."""
+    for number, limb in enumerate(anatomy.limbs_of("sleeve")):
+        if f"sleeve {number}" in cloth.values:
+            yield number, f"sleeve {number}", limb
+
+
+def cut_as_a_tailor(cloth: Cloth, anatomy: Anatomy, *, hood: bool = True) -> tuple[Cloth, list[str]]:
     """Return the cloth cut where a tailor would cut it, and notes; a hood in one with the trunk if it is not to be cut off.
 
     Its faces have the label "sleeve": the number of the sleeve, or -1.
+
+    Args:
+        cloth: with its fields (see `draw_fields`).
+        anatomy: of the garment.
+        hood: whether it is cut off.
     """
-    cloth, notes = with_drawn_sleeves(fields, anatomy), list[str]()
-    for number, (name, limb) in enumerate(fields.sleeves.items()):
+    cloth, notes = with_drawn_sleeves(cloth, anatomy), list[str]()
+    sleeves = list(_sleeves(cloth, anatomy))
+    for number, name, limb in sleeves:
         if number in cloth.labels["sleeve"]:
             continue
         cut = _cut_armhole(cloth, anatomy, name, limb, number)
@@ -252,23 +229,19 @@ def cut_as_a_tailor(fields: Fields, anatomy: Anatomy, *, hood: bool = True) -> t
         else:
             cloth = cut
     cloth = _cut_hood(cloth, anatomy) if hood else cloth
-    kind = anatomy.kind
-    if kind in ("trousers", "jumpsuit"):
-        everywhere = cloth.labels["sleeve"] < 0
-        cloth = tidied(cloth, LEFT, everywhere)
-        cloth, is_left = cloth.split(LEFT, cloth.labels["sleeve"] < 0)
-        edges = cloth.line_between(is_left, cloth.labels["sleeve"] < 0)
-        ahead = cloth.values[FACING][edges].mean(axis=1) > 0.0
-        for name, chosen in (("centre front", ahead), ("centre back", ~ahead)):
-            if chosen.any():
-                cloth = cloth.with_seam(name, edges[chosen])
-    cloth = tidied(cloth, FACING, cloth.labels["sleeve"] < 0)
-    for number in range(len(fields.sleeves)):
-        cloth = tidied(cloth, FACING, cloth.labels["sleeve"] == number)
-    cloth, ahead = cloth.split(FACING, np.ones(len(cloth.faces), dtype=bool))
+    if anatomy.kind in ("trousers", "jumpsuit"):
+        cloth, centre = centre_lines(cloth)
+        for name, edges in centre.items():
+            if len(edges):
+                cloth = cloth.with_seam(name, edges)
+    for number in range(-1, len(anatomy.limbs_of("sleeve"))):
+        cloth = cloth.without_islands(FACING, cloth.labels["sleeve"] == number)
+    cloth, ahead, _ = cloth.split(FACING, np.ones(len(cloth.faces), dtype=bool))
     trunk = cloth.labels["sleeve"] < 0
-    armpits = [float(limb.fork @ anatomy.up) for limb in fields.sleeves.values()]
-    upper = _upper(anatomy)
+    armpits = [float(limb.fork @ anatomy.up) for _, _, limb in sleeves]
+    # Above the middle of the armholes a line is a shoulder where there are no sleeves.
+    bare = [float(border.middle @ anatomy.up) for border in anatomy.borders if border.role == "sleeve"]
+    upper = float(np.mean(bare)) if bare else np.inf
     crotch = next((limb.fork for limb in anatomy.limbs_of("leg")), None)
     lines = cloth.line_between(ahead, trunk)
     on_left = cloth.values[LEFT][lines].mean(axis=1) > 0.0
@@ -294,29 +267,35 @@ def cut_as_a_tailor(fields: Fields, anatomy: Anatomy, *, hood: bool = True) -> t
     low = np.unique(
         np.concatenate([part.ravel() for word, part in ends if word in ("side", "inseam")] or [np.empty(0, np.int64)])
     )
-    for number, limb in enumerate(fields.sleeves.values()):
+    for number, _, limb in sleeves:
         if number not in cloth.labels["sleeve"]:
             continue
         cloth = _open_sleeve(cloth, ahead, number, limb, low, anatomy)
     return cloth, notes
 
 
-def with_drawn_sleeves(fields: Fields, anatomy: Anatomy, *, anywhere: bool = False) -> Cloth:
+def centre_lines(cloth: Cloth) -> tuple[Cloth, dict[str, Ids]]:
+    """Return the cloth split between left and right of the trunk, and the edges of the lines in front and behind by name."""
+    cloth, _, _, edges = cloth.parted(LEFT, cloth.labels["sleeve"] < 0)
+    ahead = cloth.values[FACING][edges].mean(axis=1) > 0.0
+    return cloth, {"centre front": edges[ahead], "centre back": edges[~ahead]}
+
+
+def with_drawn_sleeves(cloth: Cloth, anatomy: Anatomy, *, anywhere: bool = False) -> Cloth:
     """Return the cloth with the label "sleeve": the number of the sleeve that seams have cut off already, or -1.
 
     Args:
-        fields: with the cloth.
+        cloth: with its fields (see `draw_fields`).
         anatomy: of the garment.
         anywhere: whether a sleeve may begin elsewhere than near its armhole, and with some of the neck, as a raglan sleeve does.
     """
-    cloth, part = fields.cloth, fields.cloth.parts
-    label = np.full(len(cloth.faces), -1, dtype=np.int64)
+    part, label = cloth.parts, np.full(len(cloth.faces), -1, dtype=np.int64)
     whole = np.bincount(part, cloth.face_areas)
-    for number, (name, limb) in enumerate(fields.sleeves.items()):
+    for number, name, limb in _sleeves(cloth, anatomy):
         rim = anatomy.borders[limb.border].vertices
         if anywhere:
             # Parts that lie outside of the armhole, most of them: a cuff does, and the sleeve above it.
-            beyond = _reached(cloth.faces, cloth.values[name] > 0.0, rim)[cloth.faces].mean(axis=1) * cloth.face_areas
+            beyond = cloth.reached(cloth.values[name] > 0.0, rim)[cloth.faces].mean(axis=1) * cloth.face_areas
             own = (np.bincount(part, beyond) > 0.5 * whole)[part]
         else:
             own = np.isin(part, part[np.isin(cloth.faces, rim).any(axis=1)])
@@ -326,39 +305,27 @@ def with_drawn_sleeves(fields: Fields, anatomy: Anatomy, *, anywhere: bool = Fal
         near = anywhere or (len(line) > 0 and np.abs(cloth.values[name][line]).mean() <= BESIDE * anatomy.size)
         if len(line) and near and most <= (_NECK if anywhere else 0.0):
             label[own] = number
-    return replace(cloth, labels={**cloth.labels, "sleeve": label})
-
-
-def _upper(anatomy: Anatomy) -> float:
-    """Return the height above which a line is a shoulder where there are no sleeves: the middle of the armholes."""
-    own = [border.middle @ anatomy.up for border in anatomy.borders if border.role == "sleeve"]
-    return float(np.mean(own)) if own else float("inf")
+    return cloth.with_labels(sleeve=label)
 
 
 def _cut_armhole(cloth: Cloth, anatomy: Anatomy, name: str, limb: Limb, number: int) -> Cloth | None:
     """Return the cloth with an armhole cut: the first line outside of the armpit that closes around the sleeve; None if none does."""
     rim = anatomy.borders[limb.border].vertices
     base = cloth.values[name]
-    for step in range(_STEPS):
-        field = base - 0.006 * step * anatomy.size
-        trial = replace(cloth, values={**cloth.values, name: field})
-        trial = tidied(trial, name, np.ones(len(trial.faces), dtype=bool), keep=_ISLAND / 20)
+    for outwards in np.arange(0.0, BESIDE, _STEP) * anatomy.size:
+        everywhere = np.ones(len(cloth.faces), dtype=bool)
+        trial = cloth.with_values(**{name: base - outwards})
+        trial = trial.without_islands(name, everywhere, keep=ISLAND / 20)
         # Only the part beyond the line that holds the sleeve's end is the sleeve.
-        beyond = trial.values[name] > 0.0
-        part = _reached(trial.faces, beyond, rim)
+        part = trial.reached(trial.values[name] > 0.0, rim)
         if not part[rim].all():
             continue
-        within = np.asarray(part[trial.faces].any(axis=1))
-        trial, positive = trial.split(name, within)
-        grown = np.zeros(len(trial.vertices), dtype=bool)
-        grown[: len(part)] = part
+        trial, positive, _ = trial.split(name, np.asarray(part[trial.faces].any(axis=1)))
+        grown = np.append(part, np.zeros(len(trial.vertices) - len(part), dtype=bool))
         sleeve = positive & grown[trial.faces].any(axis=1)
-        loops = trial.borders(sleeve)
-        if len(loops) != 2:
+        if len(border_loops(trial.faces[sleeve].astype(np.int32))) != 2:
             continue
-        labels = dict(trial.labels)
-        labels["sleeve"] = np.where(sleeve, number, labels["sleeve"])
-        trial = replace(trial, labels=labels)
+        trial = trial.with_labels(sleeve=np.where(sleeve, number, trial.labels["sleeve"]))
         edges = trial.line_between(sleeve, np.ones(len(trial.faces), dtype=bool))
         return trial.with_seam(f"armhole {side_word(limb.side)}", edges)
     return None
@@ -371,7 +338,7 @@ def _cut_hood(cloth: Cloth, anatomy: Anatomy) -> Cloth:
     nape. Its faces have the label "sleeve" behind the last sleeve: lines of the trunk do not run in it.
     """
     opening = anatomy.border("neck") or anatomy.border("opening")
-    if opening is None or anatomy.kind not in ("top", "dress", "jumpsuit"):
+    if opening is None or anatomy.kind not in FROM_SHOULDERS:
         return cloth
     trunk = cloth.labels["sleeve"] < 0
     heights, ahead = cloth.vertices @ anatomy.up, cloth.vertices @ anatomy.front
@@ -380,7 +347,7 @@ def _cut_hood(cloth: Cloth, anatomy: Anatomy) -> Cloth:
     shoulder = max(
         (float(limb.fork @ anatomy.up) for limb in anatomy.limbs_of("sleeve")), default=top - 0.4 * anatomy.size
     )
-    levels = np.linspace(shoulder, top, _LEVELS)[1:-1]
+    levels = np.linspace(shoulder, top, LEVELS)[1:-1]
     # Around the cloth and across the opening: a hood is open there.
     girths = np.array(
         [
@@ -405,19 +372,15 @@ def _cut_hood(cloth: Cloth, anatomy: Anatomy) -> Cloth:
     rise, depth = float(rim.min()) + 0.01 * anatomy.size - level, float(ahead[low] - ahead[nape])
     slope = rise / depth if depth > 0.0 and abs(rise) < depth else 0.0
     field = heights - level - slope * (ahead - ahead[nape])
-    trial = tidied(replace(cloth, values={**cloth.values, "hood": field}), "hood", trunk)
-    trial, beyond = trial.split("hood", trunk)
-    hood = beyond & (trial.labels["sleeve"] < 0)
+    trial, beyond, within, edges = cloth.parted(field, trunk)
+    hood = beyond & within
     share = float(trial.face_areas[hood].sum() / trial.face_areas.sum())
     if not _HOOD[0] < share < _HOOD[1] or components(trial.faces[hood].astype(np.int32)).max() > 0:
         return cloth
     number = len(anatomy.limbs_of("sleeve"))
-    trial = replace(trial, labels={**trial.labels, "sleeve": np.where(hood, number, trial.labels["sleeve"])})
-    trial = trial.with_seam("hood", trial.line_between(hood, np.ones(len(trial.faces), dtype=bool)))
-    trial = tidied(trial, LEFT, hood)
-    trial, is_left = trial.split(LEFT, hood)
-    trial = trial.with_seam("hood centre", trial.line_between(is_left, trial.labels["sleeve"] == number))
-    return replace(trial, values={key: value for key, value in trial.values.items() if key != "hood"})
+    trial = trial.with_labels(sleeve=np.where(hood, number, trial.labels["sleeve"])).with_seam("hood", edges)
+    trial, _, _, middle = trial.parted(LEFT, hood)
+    return trial.with_seam("hood centre", middle)
 
 
 def _across(loop: FloatArray, height: FloatArray) -> float:
@@ -437,46 +400,12 @@ def _open_sleeve(cloth: Cloth, ahead: BoolArray, number: int, limb: Limb, low: I
     own = cloth.labels["sleeve"] == number
     name = f"underarm {side_word(limb.side)}"
     armhole = np.intersect1d(cloth.faces[own], cloth.faces[~own])
-    rim_edges = cloth.half_edges
-    border = np.unique(rim_edges.edges[rim_edges.count == 1])
     for part in edge_components(cloth.line_between(ahead, own)):
         touches = np.unique(part)
-        if np.isin(touches, armhole).any() and np.isin(touches, low).any() and np.isin(touches, border).any():
+        if (
+            np.isin(touches, armhole).any()
+            and np.isin(touches, low).any()
+            and np.isin(touches, cloth.border_edges).any()
+        ):
             return cloth.with_seam(name, part)
     return cloth
-
-
-def _reached(faces: Ids, allowed: BoolArray, seeds: Ids) -> BoolArray:
-    """Return #V, the vertices that are reached from seeds along edges between allowed ones."""
-    a, b = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    passable = allowed[a] & allowed[b]
-    label = join_labels(len(allowed), a[passable], b[passable])
-    found = np.isin(label, label[seeds[allowed[seeds]]]) & allowed
-    return np.asarray(found)
-
-
-def tidied(cloth: Cloth, level: str, within: BoolArray, *, keep: float = _ISLAND) -> Cloth:
-    """Return the cloth with islands of the other sign removed from a field: parts of a few per cent of what they lie in.
-
-    Args:
-        cloth: with the field.
-        level: its name.
-        within: #F, the faces in which islands are looked for.
-        keep: share of the area from which a part is no island.
-    """
-    f, faces = cloth.values[level], cloth.faces[within]
-    if len(faces) == 0:
-        return cloth
-    mass = np.bincount(faces.ravel(), np.repeat(cloth.face_areas[within], 3), minlength=len(f)) / 3.0
-    used = mass > 0.0
-    a, b = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    same = (f[a] > 0.0) == (f[b] > 0.0)
-    label = join_labels(len(f), a[same], b[same])
-    area = np.bincount(label, mass)
-    small = used & (area[label] < keep * mass.sum())
-    if not small.any():
-        return cloth
-    scale = 1e-2 * float(np.abs(f[used]).max())
-    made = f.copy()
-    made[small] = np.where(f[small] > 0.0, -1.0, 1.0) * np.minimum(np.abs(f[small]), scale)
-    return replace(cloth, values={**cloth.values, level: made})
