@@ -9,6 +9,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, find_unused_name, other_side, points_at_lengths, polyline_length, without_side
 from warpflat.garment.construction.edges import (
+    SAME_PIECE,
     Place,
     changed,
     direction,
@@ -20,7 +21,6 @@ from warpflat.garment.construction.edges import (
     runs_down,
     side_points,
 )
-from warpflat.garment.construction.garment import SAME_PIECE
 from warpflat.pattern import Pattern, Seam, SeamSide, drawn_length
 
 __all__ = [

@@ -22,6 +22,7 @@ from warpflat.core import (
 )
 from warpflat.flat import Flattening, run_metrics, separate
 from warpflat.garment.construction.border_seams import BorderSeam
+from warpflat.garment.construction.edges import SAME_PIECE
 from warpflat.garment.construction.laid_as_cut import CutPattern
 from warpflat.garment.construction.mirror import even_sides, mirror_images
 from warpflat.garment.construction.sewn import MeasuredSeam, Sewn, Stitching
@@ -34,10 +35,7 @@ if TYPE_CHECKING:
     from warpflat.garment.construction.wearer import WearerFit
     from warpflat.pattern import Body, DraftedOutline
 
-__all__ = ["SAME_PIECE", "Garment"]
-
-#: What differs by less than this [m] from the mirror image of its partner is cut by one pattern.
-SAME_PIECE = 5e-4
+__all__ = ["Garment"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -117,11 +117,11 @@ class Mannequin:
         Raises:
             InputError: if the mesh is not a standing body with arms and legs that can be told apart.
         """
-        from warpflat.garment.mannequin.scan import mannequin_on_scan
+        from warpflat.garment.mannequin.scan import attributes_on_scan
         from warpflat.garment.mannequin.scan_pose import ScanOptions
 
         points, options = np.asarray(vertices, float), options or ScanOptions()
-        return mannequin_on_scan(points, np.asarray(faces), options, make_layout(resolution_mm))
+        return Mannequin(**attributes_on_scan(points, np.asarray(faces), options, make_layout(resolution_mm)))
 
     @classmethod
     def _from(cls, measurements: Measurements, resolution_mm: float) -> Mannequin:

@@ -1,8 +1,9 @@
-"""The mannequin of a scanned body."""
+"""What a mannequin of a scanned body is made of."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,6 @@ from warpflat.garment.mannequin.blueprint import Blueprint, Profile
 from warpflat.garment.mannequin.builder import build_vertices
 from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.layout import RING_LEVELS, Layout
-from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.profiles import convex_girth, scale_to_girth, upper_hull
 from warpflat.garment.mannequin.rays import row_at, smooth_radii
 from warpflat.garment.mannequin.read_body import read_body, whole_sections
@@ -24,7 +24,7 @@ from warpflat.garment.mannequin.scan_sections import BodySections
 from warpflat.garment.mannequin.slicer import UP
 from warpflat.garment.mannequin.table_body import PRINCESS
 
-__all__ = ["average_sides", "mannequin_on_scan", "sides_note"]
+__all__ = ["attributes_on_scan", "average_sides", "sides_note"]
 
 # Harmonics of the sampled hulls that are kept around the body.
 _HARMONICS = 28
@@ -36,10 +36,10 @@ _ARM_LEAN = np.radians(11.0)
 _OFF_PLUMB = 0.5
 
 
-def mannequin_on_scan(
+def attributes_on_scan(
     vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions, layout: Layout
-) -> Mannequin:
-    """Fit the body model to a scan, lay it on the scan, slice it into the curves of a blueprint, and lay the grid on these.
+) -> dict[str, Any]:
+    """Return a mannequin's attributes: the body model is fitted to a scan and laid on it, and the grid on its curves.
 
     Args:
         vertices: #V by 3, any unit.
@@ -66,16 +66,16 @@ def mannequin_on_scan(
     made = build_vertices(layout, blueprint)
     told = [f"{name} was given: {height:.3f} m" for name, height in options.landmarks.items()]
     sides = sides_note(made, layout, averaged=options.symmetric)
-    return Mannequin(
-        layout=layout,
-        vertices=average_sides(made, layout) if options.symmetric else made,
-        source=f"scan of a body {read.body.stature:.3f} m tall; the body model lies {1000.0 * read.laid.far:.1f} mm off it in the mean",
-        notes=(*read.notes, *told, *guess_note(measures, read.found), *missing_note(measures), *sides),
-        sections={level: float(np.interp(levels[level], t.y, t.length)) for level in RING_LEVELS},
-        measures=measures,
-        scan=(stands.scan.vertices, read.scan.triangles),
-        placed=read.placed,
-    )
+    return {
+        "layout": layout,
+        "vertices": average_sides(made, layout) if options.symmetric else made,
+        "source": f"scan of a body {read.body.stature:.3f} m tall; the body model lies {1000.0 * read.laid.far:.1f} mm off it in the mean",
+        "notes": (*read.notes, *told, *guess_note(measures, read.found), *missing_note(measures), *sides),
+        "sections": {level: float(np.interp(levels[level], t.y, t.length)) for level in RING_LEVELS},
+        "measures": measures,
+        "scan": (stands.scan.vertices, read.scan.triangles),
+        "placed": read.placed,
+    }
 
 
 def _profiles(
