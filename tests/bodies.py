@@ -40,9 +40,9 @@ def laid_once(mannequin: Mannequin, *, name: str) -> CommonBody:
 _stood: dict[object, StandingBody] = {}
 
 
-def stood(vertices: np.ndarray, triangles: np.ndarray, scanned: int, **asked: Any) -> StandingBody:
+def stood(vertices: np.ndarray, triangles: np.ndarray, **asked: Any) -> StandingBody:
     """The body that is fitted to a scan: one fit for all that asks other things of the same scan; in place of `stand_body`."""
-    key = (vertices.tobytes(), triangles.tobytes(), scanned, repr(sorted(asked.items())))
+    key = (vertices.tobytes(), triangles.tobytes(), repr(sorted(asked.items())))
     if key not in _stood:
-        _stood[key] = stand_body(vertices, triangles, scanned, **asked)
+        _stood[key] = stand_body(vertices, triangles, **asked)
     return _stood[key]

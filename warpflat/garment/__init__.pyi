@@ -95,7 +95,7 @@ from .mannequin.bricks import TRUNK_LEVELS as TRUNK_LEVELS
 from .mannequin.bricks import select_bricks as select_bricks
 from .mannequin.card import needed_measurements as needed_measurements
 from .mannequin.card import write_measurement_card as write_measurement_card
-from .mannequin.closest import Closest as Closest
+from .mannequin.closest import Mesh as Mesh
 from .mannequin.common_body import CommonBody as CommonBody
 from .mannequin.common_body import common_body_inside as common_body_inside
 from .mannequin.common_body import common_body_of_mannequin as common_body_of_mannequin
@@ -111,7 +111,6 @@ from .mannequin.darts import usual_darts as usual_darts
 from .mannequin.ease import EASE_PRESETS as EASE_PRESETS
 from .mannequin.ease import ease_from as ease_from
 from .mannequin.elbow_darts import ELBOW as ELBOW
-from .mannequin.fit_body import Mesh as Mesh
 from .mannequin.forms import Form as Form
 from .mannequin.forms import FormResult as FormResult
 from .mannequin.forms import form_from_mapping as form_from_mapping

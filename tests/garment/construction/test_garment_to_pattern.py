@@ -20,7 +20,6 @@ from warpflat.garment.construction.edge_rules import EdgeRules
 from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.form_plan import plan_form
 from warpflat.garment.construction.garment import Garment
-from warpflat.garment.construction.mirror_pieces import evened
 from warpflat.garment.construction.to_pattern import pattern_of_garment, pattern_of_surface
 from warpflat.garment.mannequin.forms import form_from_mapping
 from warpflat.garment.mannequin.mannequin import Mannequin
@@ -144,13 +143,13 @@ def test_rules_change_kinds_and_allowances_and_are_checked(mannequins):
 def test_the_pattern_lies_on_the_flat_mesh(shirt: Garment):
     pattern, notes = pattern_of_garment({"EU 38": shirt}, name="shirt")
     assert notes == ("sleeve_left: cut twice, once mirrored, it serves for sleeve_right too",)
-    even = evened(shirt)
+    even = shirt.evened()
     for piece in pattern.pieces["EU 38"]:
-        flat, form = even.pieces[piece.name], shirt.form.pieces[piece.name]
-        np.testing.assert_allclose(flat.positions, shirt.pieces[piece.name].positions, atol=5e-5)
+        flat, form = even[piece.name], shirt.form.pieces[piece.name]
+        np.testing.assert_allclose(flat, shirt.pieces[piece.name].positions, atol=5e-5)
         assert [edge.name for edge in piece.edges] == list(form.edges)
         for edge in piece.edges:
-            np.testing.assert_array_equal(edge.points, np.round(flat.positions[form.edges[edge.name]], 6))
+            np.testing.assert_array_equal(edge.points, np.round(flat[form.edges[edge.name]], 6))
         assert piece.fabric == "interlock"
         assert not set(piece.internal_lines) & set(form.edges)
     front = pattern.piece("front", "EU 38")

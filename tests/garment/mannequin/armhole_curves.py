@@ -6,7 +6,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from warpflat.flat.surface.normals import vertex_normals
-from warpflat.garment.mannequin.closest import Closest
+from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.forms import FormResult
 from warpflat.garment.mannequin.mannequin import Mannequin
 
@@ -62,8 +62,8 @@ def depth_inside(form: FormResult, body: Mannequin) -> float:
     if not len(moved):
         return 0.0
     triangles = np.concatenate([faces[:, :3], faces[:, [0, 2, 3]]]).astype(np.int64)
-    triangle, weights, away = Closest(vertices, triangles)(form.vertices[moved])
-    place = np.einsum("nk,nkd->nd", weights, vertices[triangles[triangle]])
+    triangle, weights, place = Mesh(vertices, triangles).closest(form.vertices[moved])
+    away = np.linalg.norm(form.vertices[moved] - place, axis=1)
     outward = np.einsum("nk,nkd->nd", weights, vertex_normals(vertices, faces)[triangles[triangle]])
     inside = ((form.vertices[moved] - place) * outward).sum(axis=1) < 0.0
     return float(np.where(inside, away, 0.0).max())

@@ -15,7 +15,7 @@ from body_tapes import armpit_and_crotch
 
 from warpflat.flat.surface.io.read import read_scan
 from warpflat.garment.mannequin.mannequin import Mannequin
-from warpflat.garment.mannequin.scan import ScanFound, blueprint_from_scan
+from warpflat.garment.mannequin.read_body import ReadBody, read_body
 from warpflat.garment.mannequin.scan_pose import ScanOptions
 
 needs_bodies = pytest.mark.skipif(
@@ -32,14 +32,14 @@ def scan(name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 @functools.cache
-def _measured(name: str) -> ScanFound:
-    return blueprint_from_scan(*scan(name), ScanOptions())
+def _read(name: str) -> ReadBody:
+    return read_body(*scan(name), ScanOptions())
 
 
 @functools.cache
 def scanned_body(name: str, resolution_mm: float = 20.0) -> Mannequin:
     """The mannequin on a scan as it is; the scan is measured once for all resolutions."""
-    with mock.patch("warpflat.garment.mannequin.scan.blueprint_from_scan", return_value=_measured(name)):
+    with mock.patch("warpflat.garment.mannequin.scan.read_body", return_value=_read(name)):
         return Mannequin.from_scan(*scan(name), resolution_mm=resolution_mm)
 
 

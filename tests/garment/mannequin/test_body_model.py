@@ -14,8 +14,8 @@ from scans import needs_bodies, posed_body, scan, scanned_body, triangles_of
 from warpflat.core.errors import InputError
 from warpflat.garment.mannequin.body_landmarks import PLACES, height_weights
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation
+from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.common_body import common_body_of_scan
-from warpflat.garment.mannequin.fit_body import Mesh
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.scan_pose import LANDMARKS, ScanOptions
 from warpflat.garment.mannequin.stand_body import StandingBody, stand_body
@@ -66,34 +66,6 @@ def test_another_pose_keeps_what_lies_on_the_body() -> None:
     assert not len(trimesh.grouping.group_rows(mesh.edges_sorted, require_count=1))
 
 
-def test_nearest_places_are_those_of_a_search_over_all_triangles() -> None:
-    random = np.random.default_rng(3)
-    vertices, triangles = random.normal(size=(60, 3)), random.permutation(60).reshape(20, 3)
-    points = random.normal(size=(50, 3))
-    found, weights, places = Mesh(vertices, triangles).closest(points)
-    given = trimesh.Trimesh(vertices, triangles, process=False)
-    for point, face, weight, place in zip(points, found, weights, places, strict=True):
-        each = trimesh.triangles.closest_point(given.triangles, np.tile(point, (20, 1)))
-        far = np.linalg.norm(each - point, axis=1)
-        assert np.linalg.norm(place - point) == pytest.approx(far.min(), abs=1e-5)
-        assert far[face] == pytest.approx(far.min(), abs=1e-5)
-        np.testing.assert_allclose(weight @ vertices[triangles[face]], place, atol=1e-5)
-
-
-def test_a_place_on_an_edge_has_one_normal_whichever_triangle_it_is_told_of() -> None:
-    # Two faces of a roof; vertex normals by area.
-    roof = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, -1.0, 0.0], [-1.0, -2.0, 0.0]])
-    mesh = Mesh(roof, np.array([[0, 1, 2], [1, 0, 3]]))
-    weights = np.array([[0.3, 0.7, 0.0], [0.7, 0.3, 0.0]])
-    first, second = mesh.normals_at(np.array([0, 1]), weights)
-    np.testing.assert_allclose(first, second, atol=1e-15)
-    assert np.linalg.norm(first) == pytest.approx(1.0)
-    assert mesh.normals[0] @ mesh.normals[1] < 0.5
-    # Inside a triangle it is nearer to that one's own.
-    inside = mesh.normals_at(np.array([0]), np.array([[0.2, 0.2, 0.6]]))[0]
-    assert inside @ mesh.normals[0] > first @ mesh.normals[0] + 0.01
-
-
 @pytest.mark.parametrize("arms", [0.8, -0.5])
 def test_a_fit_finds_a_person_of_the_model(arms: float) -> None:
     model, random = BodyModel.load(), np.random.default_rng(4)
@@ -104,7 +76,7 @@ def test_a_fit_finds_a_person_of_the_model(arms: float) -> None:
     person = replace(person, bend=person.bend @ rotation(bend))
     wanted = model.vertices(person)
     wanted -= [0.0, wanted[:, 1].min(), 0.0]
-    stood = stand_body(wanted, model.triangles, len(model.triangles))
+    stood = stand_body(wanted, model.triangles)
     fit, plain = stood.fit, ~model.detail
     found = np.isfinite(fit.distance)
     assert found[plain].mean() > 0.98
@@ -122,10 +94,10 @@ def _height(laid: StandingBody, landmark: str) -> float:
 def test_the_fit_follows_a_landmark_that_is_given() -> None:
     points, faces = scan("female")
     points, triangles = points - [0.0, points[:, 1].min(), 0.0], triangles_of(faces)
-    free = stand_body(points, triangles, len(triangles))
+    free = stand_body(points, triangles)
     for name, up in {"waist": 0.03, "hip": -0.03, "elbow": 0.03, "armpit": -0.025, "crotch": -0.02}.items():
         wanted = _height(free, name) + up
-        laid = stand_body(points, triangles, len(triangles), landmarks={name: wanted})
+        laid = stand_body(points, triangles, landmarks={name: wanted})
         assert _height(laid, name) == pytest.approx(wanted, abs=0.004), name
         # The body slides within its skin.
         assert laid.unsure is None, name

@@ -3,19 +3,35 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
+import trimesh
 
-from warpflat.garment.mannequin.closest import Closest
+from warpflat.garment.mannequin.closest import Mesh
 
 
-def test_closest_is_exact_against_brute_force() -> None:
-    rng = np.random.default_rng(0)
-    vertices = rng.normal(size=(40, 3))
-    triangles = rng.integers(40, size=(60, 3))
-    triangles = triangles[(np.diff(np.sort(triangles, axis=1), axis=1) > 0).all(axis=1)]
-    points = rng.normal(size=(50, 3)) * 1.5
-    _, _, distance = Closest(vertices, triangles)(points)
-    grid = np.array([(i, j, 40 - i - j) for i in range(41) for j in range(41 - i)]) / 40.0
-    dense = np.einsum("gk,tkd->tgd", grid, vertices[triangles]).reshape(-1, 3)
-    brute = np.linalg.norm(points[:, None] - dense[None], axis=2).min(axis=1)
-    assert (distance <= brute + 1e-12).all()
-    assert (brute - distance).max() < 0.06
+def test_nearest_places_are_those_of_a_search_over_all_triangles() -> None:
+    random = np.random.default_rng(3)
+    vertices, triangles = random.normal(size=(60, 3)), random.permutation(60).reshape(20, 3)
+    points = random.normal(size=(50, 3))
+    found, weights, places = Mesh(vertices, triangles).closest(points)
+    given = trimesh.Trimesh(vertices, triangles, process=False)
+    for point, face, weight, place in zip(points, found, weights, places, strict=True):
+        each = trimesh.triangles.closest_point(given.triangles, np.tile(point, (20, 1)))
+        far = np.linalg.norm(each - point, axis=1)
+        assert np.linalg.norm(place - point) == pytest.approx(far.min(), abs=1e-6)
+        assert far[face] == pytest.approx(far.min(), abs=1e-6)
+        np.testing.assert_allclose(weight @ vertices[triangles[face]], place, atol=1e-12)
+
+
+def test_a_place_on_an_edge_has_one_normal_whichever_triangle_it_is_told_of() -> None:
+    # Two faces of a roof; vertex normals by area.
+    roof = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, -1.0, 0.0], [-1.0, -2.0, 0.0]])
+    mesh = Mesh(roof, np.array([[0, 1, 2], [1, 0, 3]]))
+    weights = np.array([[0.3, 0.7, 0.0], [0.7, 0.3, 0.0]])
+    first, second = mesh.normals_at(np.array([0, 1]), weights)
+    np.testing.assert_allclose(first, second, atol=1e-15)
+    assert np.linalg.norm(first) == pytest.approx(1.0)
+    assert mesh.normals[0] @ mesh.normals[1] < 0.5
+    # Inside a triangle it is nearer to that one's own.
+    inside = mesh.normals_at(np.array([0]), np.array([[0.2, 0.2, 0.6]]))[0]
+    assert inside @ mesh.normals[0] > first @ mesh.normals[0] + 0.01

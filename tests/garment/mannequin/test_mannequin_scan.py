@@ -23,7 +23,7 @@ from warpflat.app.cli.tables import mannequin_table, measures_table
 from warpflat.core.errors import InputError
 from warpflat.garment.construction.level_ease import level_ease
 from warpflat.garment.mannequin.body_model import finer_body
-from warpflat.garment.mannequin.closest import Closest
+from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.common_body import common_body_of_scan
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.measurements import measurements_from_size
@@ -153,7 +153,7 @@ def test_mannequin_lies_on_the_scan(sex: str) -> None:
     body = scanned_body(sex)
     layout = body.layout
     triangles = triangles_of(faces)
-    surface = Closest(points, triangles)
+    surface = Mesh(points, triangles)
     # Rows against the hull of the scan's own section at their height.
     worst: list[float] = []
     for row in layout.rings[layout.level_row["hip"] : layout.level_row["bust"] + 1 : 4]:
@@ -178,7 +178,8 @@ def test_mannequin_lies_on_the_scan(sex: str) -> None:
     sheet = np.unique(
         np.concatenate([layout.front.ravel(), layout.back.ravel(), *[y.ravel() for y in layout.yokes.values()]])
     )
-    assert surface(body.vertices[sheet])[2].mean() < 0.005
+    there = body.vertices[sheet]
+    assert np.linalg.norm(surface.closest(there)[2] - there, axis=1).mean() < 0.005
 
 
 def changed(points: np.ndarray, kind: str) -> np.ndarray:
@@ -370,7 +371,7 @@ def test_a_body_with_forty_holes_is_measured_as_the_whole_one() -> None:
     _, torn = copy_of_body(points, faces, "holes", 0.0, 0.0, 0.0)
     assert len(torn) < len(faces) - 500
     body, plain = on_scan(points, torn, 40.0), scanned_body("male")
-    assert any(note.startswith("holes closed by smooth patches") for note in body.notes)
+    assert any(note.startswith("holes, over which the body model's skin is taken") for note in body.notes)
     # Holes in hands, face and feet are too deep for what is told of them.
     for name, whole in plain.measures.items():
         if name.split(" ")[0] not in ("head", "hand", "foot"):

@@ -301,7 +301,7 @@ class FitJob:
         from scipy.spatial import cKDTree
 
         from warpflat.flat import plane_sections, triangulate
-        from warpflat.garment import Closest
+        from warpflat.garment import Mesh
 
         layers = self.read.layers
         now = [
@@ -309,13 +309,13 @@ class FitJob:
             for layer in layers
         ]
         cloth, triangles = _joined([(layer.vertices, triangulate(layer.faces)[0].astype(np.int64)) for layer in layers])
-        closest = Closest(cloth, triangles)
+        worn = Mesh(cloth, triangles)
         everywhere = np.concatenate(now)
 
         def moved(places: Sequence[Any]) -> list[Any]:
             """Return places of the file, points [m] or vertices, on the carried cloth."""
             points = np.array([place for place in places if not isinstance(place, int)], dtype=float).reshape(-1, 3)
-            triangle, weights, _ = closest(points)
+            triangle, weights, _ = worn.closest(points)
             there = iter(np.einsum("pk,pka->pa", weights, everywhere[triangles[triangle]]).tolist())
             return [place if isinstance(place, int) else next(there) for place in places]
 

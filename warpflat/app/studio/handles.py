@@ -15,7 +15,7 @@ from warpflat.app.studio.cut_tables import rounded
 from warpflat.app.studio.solve import Solution
 from warpflat.core import FloatArray, IntArray, arc_lengths, unit
 from warpflat.flat import Crack, border_loops, seam_kind, triangulate
-from warpflat.garment import Closest, FormDart, Neckline, PlacedDart, dart_part, select_bricks
+from warpflat.garment import FormDart, Mesh, Neckline, PlacedDart, dart_part, select_bricks
 
 __all__ = ["Handle", "pattern_handles"]
 
@@ -273,5 +273,5 @@ def _move_end(
 def _on_surface(vertices: FloatArray, faces: IntArray, flat: FloatArray, place: FloatArray) -> FloatArray:
     """Return the point of a surface (#V by 3 [m]) that lies at a place (2) of its pattern (#V by 2), or nearest to it."""
     triangles = triangulate(faces)[0].astype(np.int64)
-    nearest, weights, _ = Closest(flat, triangles)(place[None])
+    nearest, weights, _ = Mesh(np.pad(flat, [(0, 0), (0, 1)]), triangles).closest(np.append(place, 0.0)[None])
     return np.asarray(weights[0] @ vertices[triangles[nearest[0]]])

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from warpflat.core import FloatArray, IntArray, guarded
-from warpflat.flat import DEFAULT_FABRIC, Fabric, Surface, as_fabric, triangulate
+from warpflat.flat import DEFAULT_FABRIC, Fabric, Surface, area_vectors, as_fabric, triangulate
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.laid_as_cut import CutPattern, distances_laid, laid_as_cut
 from warpflat.garment.construction.sew_pieces import meeting_borders, name_seams
@@ -115,10 +115,7 @@ def worn_at(worn: Mapping[str, tuple[FloatArray, IntArray]], seams: Sequence[Sea
         seams: between them.
     """
     middle = {name: points[corners].mean(axis=1) for name, (points, corners) in worn.items()}
-    vector = {
-        name: np.cross(points[corners[:, 1]] - points[corners[:, 0]], points[corners[:, 2]] - points[corners[:, 0]])
-        for name, (points, corners) in worn.items()
-    }
+    vector = {name: area_vectors(points, corners) for name, (points, corners) in worn.items()}
     every = np.concatenate(list(middle.values()))
     centre = 0.5 * (every[:, 0].min() + every[:, 0].max())
     side = {}

@@ -12,7 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core import FloatArray, factor_symmetric
-from warpflat.flat import Surface, border_loops, cotangent_matrix, falloff_weights, triangulate, vertex_normals
+from warpflat.flat import (
+    Surface,
+    area_vectors,
+    border_loops,
+    cotangent_matrix,
+    falloff_weights,
+    triangulate,
+    vertex_normals,
+)
 
 __all__ = ["carry", "carry_points", "skin_frames", "skin_under"]
 
@@ -110,8 +118,7 @@ def carry(surface: Surface, before: FloatArray, after: FloatArray, triangles: ND
     moved, far = carry_points(surface.vertices, normals, before, after, triangles)
     # Least squares of the move against a smooth one; second differences, so that a move that grows evenly is smooth.
     stiff = cotangent_matrix(surface)
-    a, b, c = surface.vertices[corners].transpose(1, 0, 2)
-    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    area = np.linalg.norm(area_vectors(surface.vertices, corners), axis=1)
     mass = np.maximum(np.bincount(corners.ravel(), np.repeat(area / 3.0, 3), minlength=len(moved)), 1e-12)
     trust = mass / (1.0 + (far / _OFF) ** 2)
     system = diags_array(trust) + _SMOOTH**4 * (stiff @ diags_array(1.0 / mass) @ stiff)

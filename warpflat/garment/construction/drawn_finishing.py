@@ -14,6 +14,7 @@ import numpy as np
 
 from warpflat.core import BoolArray, FloatArray, arc_lengths, line_name, unit
 from warpflat.flat import triangulate, vertex_normals
+from warpflat.garment.mannequin.slicer import UP
 from warpflat.pattern import ViewedPiece
 
 if TYPE_CHECKING:
@@ -26,7 +27,6 @@ __all__ = ["finishing_views"]
 _MEET, _STEP = 0.012, 0.004
 # What is narrower in the view than this [m] is a sliver at the silhouette.
 _SLIVER = 0.015
-_UP = np.array([0.0, 1.0, 0.0])
 # What a strip stands out for each length that it falls: in pleats, for each share that is gathered, and for each full turn of a flounce;
 # at most so much.
 _PLEATS_OUT, _GATHERS_OUT, _FLOUNCE_OUT, _MOST_OUT = 0.05, 0.12, 0.45, 0.6
@@ -141,8 +141,7 @@ def _chains(garment: FormGarment, called: str) -> Iterator[_Chain]:
             if line_name(edge) != called:
                 continue
             points, out = surface.vertices[ids], normals[ids]
-            beyond = np.cross(np.gradient(points, axis=0), out)
-            beyond /= np.maximum(np.linalg.norm(beyond, axis=1, keepdims=True), 1e-12)
+            beyond = unit(np.cross(np.gradient(points, axis=0), out))
             if ((points - surface.vertices.mean(axis=0)) * beyond).sum() < 0.0:
                 beyond = -beyond
             rows.append((points, out, beyond))
@@ -219,7 +218,7 @@ def _collar(wish: Finishing, chain: _Chain, level: FloatArray) -> Iterator[_Shee
     collar = wish.collar
     assert collar is not None
     if collar.style == "turtleneck":
-        yield _Sheet(rows=np.stack([chain.points, chain.points + wish.width * _UP]), out=level)
+        yield _Sheet(rows=np.stack([chain.points, chain.points + wish.width * UP]), out=level)
         return
     chain = chain.from_front()
     level = unit(chain.out * [1.0, 0.0, 1.0])
@@ -227,7 +226,7 @@ def _collar(wish: Finishing, chain: _Chain, level: FloatArray) -> Iterator[_Shee
     # From nothing in the middle to one at both ends, in the front.
     ends = np.clip(np.abs(2.0 * arc / arc[-1] - 1.0) * 4.0 - 3.0, 0.0, 1.0)[:, None]
     if collar.style == "stand":
-        rows = [chain.points, chain.points + collar.width * (_UP - 0.2 * level)]
+        rows = [chain.points, chain.points + collar.width * (UP - 0.2 * level)]
     elif collar.style == "flat":
         wide = collar.width * np.sqrt(np.clip(1.0 - 0.7 * ends**4, 0.0, 1.0))
         rows = [chain.points, chain.points - wide * chain.beyond + 0.004 * chain.out]
@@ -236,9 +235,9 @@ def _collar(wish: Finishing, chain: _Chain, level: FloatArray) -> Iterator[_Shee
         if collar.style == "convertible":
             stand, fall = 0.4 * collar.width, 0.6 * collar.width
         inwards = np.sign(0.5 * arc[-1] - arc)[:, None] * unit(np.gradient(chain.points, axis=0))
-        top = chain.points + stand * (1.0 - (collar.style == "convertible") * ends) * _UP
+        top = chain.points + stand * (1.0 - (collar.style == "convertible") * ends) * UP
         long = fall * 1.2 + ends * (collar.point - fall * 1.2)
-        rows = [top, top + long * unit(-_UP + 0.5 * level + 0.7 * ends * inwards)]
+        rows = [top, top + long * unit(-UP + 0.5 * level + 0.7 * ends * inwards)]
     yield _Sheet(rows=np.stack(rows), out=level)
     if wish.placket:
         top, down = chain.points[0], np.array([0.0, -wish.placket, 0.0])
@@ -264,9 +263,9 @@ def _hood(chain: _Chain) -> _Sheet:
         radius = (
             wide * np.sqrt(max(1.0 - ((up - _HOOD_NECK) / (1.0 - _HOOD_NECK)) ** 2, 0.0)) if up > _HOOD_NECK else wide
         )
-        ring = middle + up * high * _UP + radius * around
+        ring = middle + up * high * UP + radius * around
         blend = min(up / _HOOD_NECK, 1.0)
-        rows.append((1.0 - blend) * (chain.points + up * high * _UP) + blend * ring)
+        rows.append((1.0 - blend) * (chain.points + up * high * UP) + blend * ring)
     grid = np.stack(rows)
     columns = np.arange(len(share), dtype=float)
     front = [(grid[:, end], np.full(len(rows), columns[end])) for end in (0, -1)]

@@ -55,28 +55,26 @@ class SeamRatios:
 
     Attributes:
         ease: by seam of the pattern, how much longer its second side is, as a share of the first.
-        ratios: for each of the form's seams the wished length of its first side over its second.
+        ratios: for each of the form's seams, and each of its runs, the wished length of its first side over its second, one for the run or
+            one for each of its mesh edges.
         full: by piece, its edges with more cloth than the body needs.
         eased: by seam of the pattern, the shares of its length between which it is eased, if not all along.
-        edge_ratios: by number of the form's seam, the ratio of each mesh edge of each of its runs, where these differ.
     """
 
     ease: Mapping[str, float]
-    ratios: tuple[float, ...]
+    ratios: tuple[tuple[float | FloatArray, ...], ...]
     full: Mapping[str, tuple[FullEdge, ...]]
     eased: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    edge_ratios: Mapping[int, tuple[FloatArray, ...]] = field(default_factory=dict)
 
     def stitching(self, form: FormResult) -> list[Stitching]:
         """Return the seams of the form, run by run, as they are to be sewn."""
         return [
             Stitching(
-                name=seam.name, pieces=seam.pieces, vertices=run.vertices,
-                ratio=self.edge_ratios[number][i] if number in self.edge_ratios else self.ratios[number],
+                name=seam.name, pieces=seam.pieces, vertices=run.vertices, ratio=ratio,
                 sides=(f"{seam.pieces[0]}.{seam.edges[0]}", f"{seam.pieces[1]}.{seam.edges[1]}"),
             )
-            for number, seam in enumerate(form.seams)
-            for i, run in enumerate(seam.runs)
+            for seam, ratios in zip(form.seams, self.ratios, strict=True)
+            for run, ratio in zip(seam.runs, ratios, strict=True)
         ]  # fmt: skip
 
 
@@ -93,11 +91,10 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
     plan = plan_form(form)
     by_name = {seam.name: seam for seam in plan.seams}
     also = {seam.name: plan.of_form[i][0].name for i, seam in enumerate(form.seams)}
-    ratios = [1.0] * len(form.seams)
+    ratios: list[list[float | FloatArray]] = [[1.0] * len(seam.runs) for seam in form.seams]
     ease: dict[str, float] = {}
     full: dict[str, list[FullEdge]] = {}
     eased: dict[str, tuple[float, float]] = {}
-    edge_ratios: dict[int, tuple[FloatArray, ...]] = {}
     caps = {name: seam for name, seam in by_name.items() if _is_cap(form, seam)}
     for wish in wishes:
         # The pattern's name of the seam that a wish is about; the form's names are accepted too.
@@ -113,11 +110,10 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
         for number, (seam, first_side) in enumerate(plan.of_form):
             if seam.name != name:
                 continue
-            side = 0 if longer == first_side else 1
-            ratios[number] = wish.factor if side == 0 else 1.0 / wish.factor
+            side, here = 0 if longer == first_side else 1, form.seams[number]
+            ratios[number] = [wish.factor if side == 0 else 1.0 / wish.factor] * len(here.runs)
             if wish.factor == 1.0:
                 continue  # as long as on the body: nothing to ease in
-            here = form.seams[number]
             if wish.upper and name in caps and longer == 1 and not wish.gathered:
                 eased[name] = _along_seam(
                     caps[name].sides[1][0], _cap_part(form.pieces[here.pieces[side]], here.runs[0].edges[side])
@@ -128,16 +124,15 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
                 piece = form.pieces[here.pieces[side]]
                 for run in here.runs:
                     cap, row = piece.edges[run.edges[side]], run.vertices[side]
-                    shares = _shares(piece, cap)
+                    shares, (first, last) = _shares(piece, cap), run.spans[side]
                     part = _part(shares, _cap_part(piece, run.edges[side]))
-                    place = dict(zip(cap.tolist(), shares.tolist(), strict=True))
-                    share = np.array([place[vertex] for vertex in row.tolist()])
+                    share = shares[first : last + 1][:: -1 if side == 1 and run.against else 1]
                     factors.append(_factors(share, wish.factor, part))
                     upper = row[(share >= part[0]) & (share <= part[1])]
                     # What of an armhole lies in a lower piece, below a yoke, may hardly reach there.
                     if len(upper) > 1:
                         edges.append(FullEdge(vertices=upper, factor=_upper_factor(wish.factor, part), gathered=False))
-                edge_ratios[number] = tuple(each if side == 0 else 1.0 / each for each in factors)
+                ratios[number] = [each if side == 0 else 1.0 / each for each in factors]
                 if edges:
                     full.setdefault(here.pieces[side], []).extend(edges)
                 continue
@@ -145,8 +140,7 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
                 FullEdge(vertices=run.vertices[side], factor=wish.factor, gathered=wish.gathered) for run in here.runs
             )
     return SeamRatios(
-        ease=ease, ratios=tuple(ratios), full={name: tuple(edges) for name, edges in full.items()}, eased=eased,
-        edge_ratios=edge_ratios,
+        ease=ease, ratios=tuple(map(tuple, ratios)), full={name: tuple(edges) for name, edges in full.items()}, eased=eased,
     )  # fmt: skip
 
 

@@ -13,12 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core import FloatArray, find_unused_name, part_between
+from warpflat.core import FloatArray, find_unused_name, part_between, unit
 from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
 
 __all__ = [
     "ON",
     "ON_EDGE",
+    "SAME_LINE",
+    "SAME_PIECE",
+    "SHORT",
     "Place",
     "added",
     "backwards",
@@ -58,13 +61,17 @@ Sides = SeamSide | tuple[SeamSide, ...]
 
 #: What lies on a line or an outline does so within this distance [m]; a line of a piece ends on an edge within the second.
 ON, ON_EDGE = 1e-6, 1e-3
-# A line that is shorter inside an outline is left out [m].
-_SHORT = 1e-3
+#: A line or a stretch that is shorter is left out [m].
+SHORT = 1e-3
+#: Lines that differ by no more [m] are one.
+SAME_LINE = 5e-5
+#: What differs by less than this [m] from the mirror image of its partner is cut by one pattern.
+SAME_PIECE = 5e-4
 
 
 def direction(points: FloatArray) -> FloatArray:
     """Return the unit vector from the first point of a line to its last."""
-    return np.asarray((points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0]))
+    return unit(points[-1] - points[0])
 
 
 def joined(*lines: FloatArray) -> FloatArray:
@@ -88,7 +95,7 @@ def lines_inside(lines: Mapping[str, FloatArray], outline: FloatArray) -> dict[s
     body, found = shapely.Polygon(outline).buffer(ON), {}
     for name, line in lines.items():
         parts = shapely.get_parts(shapely.LineString(line).intersection(body))
-        parts = [part for part in parts if part.geom_type == "LineString" and part.length > _SHORT]
+        parts = [part for part in parts if part.geom_type == "LineString" and part.length > SHORT]
         if parts:
             found[name] = np.asarray(max(parts, key=lambda part: part.length).coords)
     return found

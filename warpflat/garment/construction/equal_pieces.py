@@ -10,6 +10,7 @@ from itertools import islice, pairwise, product
 import numpy as np
 
 from warpflat.core import FloatArray, arc_lengths, points_at_lengths, without_side
+from warpflat.garment.construction.edges import SAME_LINE
 from warpflat.pattern import Pattern, Piece, Seam, SeamSide
 
 __all__ = ["draw_equal_pieces_once"]
@@ -17,8 +18,6 @@ __all__ = ["draw_equal_pieces_once"]
 # Outlines are equal if they lie on each other within this [m], and this share of their size, after a rigid motion; grains are
 # within this [rad].
 _SAME_OUTLINE, _SHARE, _SAME_GRAIN = 1.5e-3, 0.01, np.radians(3.0)
-# Outlines that differ by no more than this [m] are not averaged.
-_SAME_LINE = 5e-5
 # So many ways of laying all copies are tried until their seams run alike.
 _MOST_WAYS = 256
 # Places along each edge at which outlines are compared.
@@ -123,7 +122,7 @@ def draw_equal_pieces_once(pattern: Pattern, called: str = "") -> tuple[Pattern,
                 paired = False
             piece = replace(piece, quantity=count, paired=paired)
             words = f"{piece.name}: cut {count} times, it serves for {', '.join(own)} too"
-            if moved > _SAME_LINE:
+            if moved > SAME_LINE:
                 words += f"; they are averaged, which moves their outlines by at most {1e3 * moved:.1f} mm"
             notes.append(words)
         drawn.append(piece)
@@ -202,7 +201,7 @@ def _averaged(head: Piece, copies: Sequence[_Copy]) -> tuple[Piece, float]:
         mean = np.mean(rows, axis=0)
         moved = max(moved, float(np.linalg.norm(np.array(rows) - mean, axis=2).max()))
         edges.append(replace(edge, points=mean))
-    if moved <= _SAME_LINE:
+    if moved <= SAME_LINE:
         return head, moved
     for edge, following in pairwise([*edges, edges[0]]):
         # The corner of both is one point, bit for bit.

@@ -27,6 +27,7 @@ from warpflat.garment.construction.finishing import with_plackets
 from warpflat.garment.construction.fullness import give_fullness
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.girths import girth_constraints, loose_armholes, pattern_girths
+from warpflat.garment.construction.mirror import match_images
 from warpflat.garment.construction.openings import opened_rings
 from warpflat.garment.construction.rings import GarmentRing, measure_rings
 from warpflat.garment.construction.sewing import sew
@@ -55,26 +56,12 @@ class FormGarment(Garment):
     wished: SeamRatios | None = None
     curves: Curves | None = None
 
-    def mirror_vertices(self, first: str, second: str) -> IntArray | None:
-        """Return for each vertex of one piece its mirror image in the other, in space; None if they are no pair.
-
-        Matched face by face: along a line at which a piece is cut open, a vertex of the mannequin is two of the piece.
-        """
-        one, two, image = self.form.pieces[first], self.form.pieces[second], self.mannequin.layout.mirror
-        if len(one.grid_vertices) != len(two.grid_vertices) or len(one.face_brick) != len(two.face_brick):
-            return None
-        rows = two.grid_vertices[two.surface.faces].tolist()
-        faces = {
-            frozenset(row): dict(zip(row, face, strict=True))
-            for row, face in zip(rows, two.surface.faces.tolist(), strict=True)
-        }
-        partners = np.full(len(one.grid_vertices), -1, dtype=np.int32)
-        for row, face in zip(image[one.grid_vertices[one.surface.faces]].tolist(), one.surface.faces, strict=True):
-            other = faces.get(frozenset(row))
-            if other is None:
-                return None
-            partners[face] = [other[vertex] for vertex in row]
-        return partners
+    @cached_property
+    def images(self) -> dict[str, tuple[str, IntArray]]:
+        """By piece its mirror image, as the grid tells it: a body's two sides lie only nearly alike."""
+        grid = np.concatenate([piece.grid_vertices for piece in self.form.pieces.values()])
+        surfaces = {name: piece.surface for name, piece in self.form.pieces.items()}
+        return match_images(surfaces, grid, self.mannequin.layout.mirror[grid])
 
     @property
     def notes(self) -> tuple[str, ...]:

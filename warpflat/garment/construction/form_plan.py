@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import InputError, IntArray, find_unused_name, nearest
+from warpflat.core import InputError, find_unused_name, nearest
 from warpflat.garment.construction.edge_rules import EdgeRules
 from warpflat.pattern import HEMMED_LEVELS, Seam, SeamSide
 
@@ -103,7 +103,7 @@ def plan_form(form: FormResult, rules: EdgeRules | None = None) -> FormPlan:
         InputError: the rules name an edge or a kind that does not exist.
     """
     rules = rules or EdgeRules()
-    sewing = _FormSeams(form)
+    sewing = _SewnEdges(form)
     edges = {name: _plan_edges(form, name, sewing, rules) for name in form.pieces}
     rules.check({name: [plan.name for plan in plans] for name, plans in edges.items()})
     half = any(piece.fold for piece in form.pieces.values())
@@ -112,7 +112,7 @@ def plan_form(form: FormResult, rules: EdgeRules | None = None) -> FormPlan:
     return FormPlan(edges=edges, seams=seams, of_form=of_form, quantities=quantities)
 
 
-def _plan_edges(form: FormResult, name: str, sewing: _FormSeams, rules: EdgeRules) -> tuple[EdgePlan, ...]:
+def _plan_edges(form: FormResult, name: str, sewing: _SewnEdges, rules: EdgeRules) -> tuple[EdgePlan, ...]:
     """Split the edges of one piece where they begin or end to be sewn, and give each part its name and kind."""
     piece = form.pieces[name]
     plans: list[EdgePlan] = []
@@ -173,8 +173,8 @@ def find_fold_lines(form: FormResult, plan: FormPlan) -> dict[str, str]:
     }
 
 
-class _FormSeams:
-    """The seams of a form, edge by edge.
+class _SewnEdges:
+    """The edges of a form that are sewn, stretch by stretch.
 
     Attributes:
         sides: the stretches along both sides of every seam, in the seam's order.
@@ -223,11 +223,7 @@ def _stretches(form: FormResult, number: int, side: int) -> tuple[_Stretch, ...]
     seam, found = form.seams[number], list[_Stretch]()
     piece = seam.pieces[side]
     for run in seam.runs:
-        edge, vertices = run.edges[side], np.asarray(run.vertices[side])
-        ids = np.asarray(form.pieces[piece].edges[edge])
-        against = not _occurrences(ids, vertices)
-        first = _occurrences(ids, vertices[::-1] if against else vertices)[0]
-        last = first + len(vertices) - 1
+        edge, (first, last), against = run.edges[side], run.spans[side], run.against and side == 1
         stretch = _Stretch(seam=number, side=side, piece=piece, edge=edge, first=first, last=last, against=against)
         if found and found[-1].edge == edge and (found[-1].first == last if against else found[-1].last == first):
             before = found.pop()
@@ -236,14 +232,8 @@ def _stretches(form: FormResult, number: int, side: int) -> tuple[_Stretch, ...]
     return tuple(found)
 
 
-def _occurrences(ids: IntArray, vertices: IntArray) -> list[int]:
-    """Return the places in an edge at which a row of vertices begins."""
-    count = len(vertices)
-    return [i for i in range(len(ids) - count + 1) if np.array_equal(ids[i : i + count], vertices)]
-
-
 def _plan_seams(
-    form: FormResult, sewing: _FormSeams, edges: Mapping[str, Sequence[EdgePlan]], rules: EdgeRules
+    form: FormResult, sewing: _SewnEdges, edges: Mapping[str, Sequence[EdgePlan]], rules: EdgeRules
 ) -> tuple[tuple[Seam, ...], tuple[tuple[Seam, int], ...]]:
     """Return the seams of the pattern, and for each of the form's seams see `FormPlan.of_form`; a hub's are one seam.
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, find_unused_name, other_side, points_at_lengths, polyline_length, without_side
 from warpflat.garment.construction.edges import (
+    SAME_PIECE,
     Place,
     changed,
     direction,
@@ -40,8 +41,6 @@ _Corner = tuple[str, str, bool, int]
 #: Where chains end though the cloth goes on, as at a slit: piece, edge, and the end of the edge (0 or 1).
 Break = tuple[str, str, int]
 
-# Chains of both sides of the body whose lengths differ by no more [m] get one piece, cut twice.
-_ALIKE = 5e-4
 #: A line meets an edge inside it, not at its ends, beyond this distance [m].
 OFF_END = 2e-3
 # Directions at the ends of edges are those of their first or last so much [m].
@@ -115,7 +114,9 @@ def free_chains(
         mirrored = {(other_side(piece), other_side(edge)) for piece, edge in own}
         sided = any(without_side(edge) != edge for _, edge in own)
         twin = next((each for each in chains if each is not chain and mirrored & {s.place for s in each.sides}), None)
-        if not sided or (twin is not None and abs(chain_length(pattern, chain) - chain_length(pattern, twin)) > _ALIKE):
+        if not sided or (
+            twin is not None and abs(chain_length(pattern, chain) - chain_length(pattern, twin)) > SAME_PIECE
+        ):
             found.append((chain, 1))
         elif twin not in drawn_for_both:
             found.append((chain, 2))
@@ -205,7 +206,8 @@ def split_edge(pattern: Pattern, place: Place, at: Mapping[str, float]) -> tuple
     name, edge = place
     sample = pattern.piece(name, pattern.sample)
     new = find_unused_name(edge, {each.name for each in sample.edges})
-    names = (edge, new) if at[pattern.sample] > 0.5 * sample.edge(edge).length else (new, edge)
+    # Of two parts that are equally long, as in the centre, the last one.
+    names = (edge, new) if at[pattern.sample] > 0.5 * sample.edge(edge).length + OFF_END else (new, edge)
     made = changed(pattern, place, lambda piece, whole: parted(whole, at[piece.size], names))
     return made, (name, names[0], 1)
 

@@ -10,11 +10,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core import FloatArray, IntArray, arc_lengths, file_in, optional_file, polyline_length
+from warpflat.core import (
+    FloatArray,
+    IntArray,
+    arc_lengths,
+    file_in,
+    optional_file,
+    output_folder,
+    polyline_length,
+    write_report,
+)
 from warpflat.flat import Flattening, run_metrics, separate
 from warpflat.garment.construction.border_seams import BorderSeam
+from warpflat.garment.construction.edges import SAME_PIECE
 from warpflat.garment.construction.laid_as_cut import CutPattern
-from warpflat.garment.construction.mirror import mirror_images
+from warpflat.garment.construction.mirror import even_sides, mirror_images
 from warpflat.garment.construction.sewn import MeasuredSeam, Sewn, Stitching
 
 if TYPE_CHECKING:
@@ -26,9 +36,6 @@ if TYPE_CHECKING:
     from warpflat.pattern import Body, DraftedOutline
 
 __all__ = ["Garment"]
-
-# Largest distance [m] of a piece from the mirror image of its partner at which one pattern serves for both.
-_SAME_PIECE = 5e-4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -118,22 +125,26 @@ class Garment:
 
         One of the two is enough for the table: cut it twice, the second time turned over.
         """
-        found = []
-        names = list(self.pieces)
-        for number, first in enumerate(names):
-            for second in names[number + 1 :]:
-                partners = self.mirror_vertices(first, second)
-                if partners is None:
-                    continue
+        found, names = [], list(self.pieces)
+        for first in names:
+            second, partners = self.images.get(first, (first, None))
+            if names.index(second) > names.index(first):
                 a, b = self.pieces[first].positions * [-1.0, 1.0], self.pieces[second].positions[partners]
-                if np.abs((a - a.mean(axis=0)) - (b - b.mean(axis=0))).max() < _SAME_PIECE:
+                if np.abs((a - a.mean(axis=0)) - (b - b.mean(axis=0))).max() < SAME_PIECE:
                     found.append((first, second))
         return tuple(found)
 
-    def mirror_vertices(self, first: str, second: str) -> IntArray | None:
-        """Return for each vertex of one piece its mirror image in the other, in space; None if they are no pair."""
-        mate, partners = self._images.get(first, (None, None))
-        return partners if mate == second else None
+    @cached_property
+    def images(self) -> dict[str, tuple[str, IntArray]]:
+        """By piece its mirror image in space, perhaps itself, and for each of its vertices that one's; without pieces that have none."""
+        return mirror_images({name: piece.network.surface for name, piece in self.pieces.items()})
+
+    def evened(self) -> dict[str, FloatArray]:
+        """Return the layouts, each #P by 2 [m], as the means of themselves and their mirror images, if all pieces have one.
+
+        A relaxation ends as far to the left or right of its symmetric rest as its tolerance leaves, some hundredths of a millimetre.
+        """
+        return even_sides(self.positions, self.images)
 
     @property
     def sources(self) -> tuple[Path, ...]:
@@ -164,10 +175,6 @@ class Garment:
     def drawn_body(self) -> Body | None:
         """The body on which a picture shows it first."""
         return None
-
-    @cached_property
-    def _images(self) -> dict[str, tuple[str, IntArray]]:
-        return mirror_images({name: piece.network.surface for name, piece in self.pieces.items()})
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -218,8 +225,6 @@ class Garment:
         Raises:
             InputError: the folder cannot be written, or the body was read from a file there that would be replaced.
         """
-        from warpflat.core import output_folder, write_report
-
         others = [*(["picture.png"] if picture else []), "metrics.json"]
         with output_folder(folder, others, sources=self.sources, guard=True) as to:
             files = self.write_files(to, picture=picture)

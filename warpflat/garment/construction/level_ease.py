@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from warpflat.core import FloatArray
+from warpflat.core import FloatArray, unit
 from warpflat.flat import vertex_normals
 from warpflat.garment.construction.carry import skin_under
 from warpflat.garment.mannequin.body_landmarks import model_places
 from warpflat.garment.mannequin.body_model import finer_body
 from warpflat.garment.mannequin.common_body import CommonBody, skin_triangles
 from warpflat.garment.mannequin.profiles import convex_girth
-from warpflat.garment.mannequin.slicer import Slicer
+from warpflat.garment.mannequin.slicer import UP, Slicer
 
 __all__ = ["EASE_LEVELS", "level_ease", "widened"]
 
@@ -23,7 +23,6 @@ __all__ = ["EASE_LEVELS", "level_ease", "widened"]
 EASE_LEVELS = ("bust", "underbust", "waist", "hip")
 # Above the bust what is asked there fades out, up to here.
 _TOP = "front_neck"
-_UP = np.array([0.0, 1.0, 0.0])
 
 
 def level_ease(
@@ -43,11 +42,11 @@ def level_ease(
     of_arm = places.strips["arm left"] | places.strips["arm right"]
     for name in EASE_LEVELS:
         height = body.level(name)
-        parts = [part.points[:, [0, 2]] for part in skin.cut(_UP, height)]
+        parts = [part.points[:, [0, 2]] for part in skin.cut(UP, height)]
         trunk = max(parts, key=lambda points: float(np.ptp(points, axis=0).prod()))
         middle = 0.5 * (trunk.min(axis=0) + trunk.max(axis=0))
         rings = []
-        for part in (part for slicer in slicers for part in slicer.cut(_UP, height) if part.closed):
+        for part in (part for slicer in slicers for part in slicer.cut(UP, height) if part.closed):
             sleeve = of_arm[nearest.query(part.points)[1]]
             points = part.points[~sleeve][:, [0, 2]]
             if len(points) > 2 and (points.min(axis=0) < middle).all() and (points.max(axis=0) > middle).all():
@@ -83,9 +82,7 @@ def widened(
     out = []
     for vertices, triangles in layers:
         near, weight, _ = skin_under(vertices, vertex_normals(vertices, triangles), body.vertices, skin_triangles())
-        way = np.einsum("pk,pka->pa", weight, skin[near])
-        way[:, 1] = 0.0
-        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
+        way = unit(np.einsum("pk,pka->pa", weight, skin[near]) * [1.0, 0.0, 1.0])
         here = np.interp(vertices[:, 1], heights, off) * (1.0 - np.einsum("pk,pk->p", weight, arm[near]))
         out.append(vertices + here[:, None] * way)
     return out

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core import FloatArray, IntArray, arc_lengths, other_side, points_at_lengths, without_side
-from warpflat.flat import border_loops, judge, triangulate, vertex_normals
+from warpflat.core import FloatArray, IntArray, arc_lengths, other_side, points_at_lengths, unit, without_side
+from warpflat.flat import area_vectors, border_loops, judge, triangulate, vertex_normals
 from warpflat.garment.construction.button_stand import button_depths
 from warpflat.garment.construction.drawn_finishing import finishing_views
 from warpflat.garment.construction.form_garment import FormGarment
@@ -30,8 +30,8 @@ __all__ = ["describe_worn"]
 _WITHIN, _LEAST_AREA = 0.001, 1e-5
 # Slits and spikes of an outline are narrower than twice this [m].
 _SLIT = 1e-4
-# A triangle of less than twice this area [m2] in the view is seen edge on: it covers nothing.
-_SEEN_EDGE_ON = 1e-12
+# A triangle of less than this area [m2] in the view is seen edge on: it covers nothing.
+_SEEN_EDGE_ON = 5e-13
 # A face whose normal points away from the viewer by more than this cosine is on the far side.
 _NEAR_SIDE, _EDGE_ON = -0.1, -0.6
 # Teeth of a zip are drawn so far apart; the bar at its end, and a circle of radius 1 [m].
@@ -282,10 +282,8 @@ def _views(flat: Flattening, *, half: bool) -> tuple[ViewedPiece, ViewedPiece]:
     faces, space = flat.faces, flat.surface.vertices[flat.vertex_origin]
     triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
     mirrored = [space[:, :2], space[:, :2] * [-1.0, 1.0]] if half else [space[:, :2]]
-    shown = space[triangles][:, :, :2]
-    turn = shown[:, 1:] - shown[:, :1]
-    doubled = turn[:, 0, 0] * turn[:, 1, 1] - turn[:, 0, 1] * turn[:, 1, 0]
-    merged = [part for side in (1.0, -1.0) for part in _merged(shown[side * doubled > _SEEN_EDGE_ON])]
+    shown, vectors = space[triangles][:, :, :2], area_vectors(space, triangles)
+    merged = [part for side in (1.0, -1.0) for part in _merged(shown[side * vectors[:, 2] > _SEEN_EDGE_ON])]
     if half:
         merged += [shapely.transform(part, lambda xy: xy * [-1.0, 1.0]) for part in merged]
     # What it covers from the back is the mirror image of what it covers from the front.
@@ -296,9 +294,7 @@ def _views(flat: Flattening, *, half: bool) -> tuple[ViewedPiece, ViewedPiece]:
     covered = covered.simplify(_WITHIN)
     parts = [part for part in shapely.get_parts(covered) if part.geom_type == "Polygon" and part.area > _LEAST_AREA]
     outlines = [np.asarray(part.exterior.coords)[:-1] for part in parts]
-    corners = space[triangles]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    forward = np.repeat(normals[:, 2] / np.maximum(np.linalg.norm(normals, axis=1), 1e-30), 3)
+    forward = np.repeat(unit(vectors)[:, 2], 3)
     sides = list(zip(triangles.ravel().tolist(), np.roll(triangles, -1, axis=1).ravel().tolist(), strict=True))
     views = []
     for sign in (1.0, -1.0):

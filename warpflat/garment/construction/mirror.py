@@ -11,7 +11,7 @@ import numpy as np
 from warpflat.core import FloatArray, InputError, IntArray, reflected
 from warpflat.flat import SAME_PLACE, Surface, half_edges, join_labels
 
-__all__ = ["even_sides", "mirror_images", "mirror_partners", "mirror_plane"]
+__all__ = ["even_sides", "match_images", "mirror_images", "mirror_partners", "mirror_plane"]
 
 #: Layouts of which one is the other's mirror image within this [m] become so exactly.
 NEARLY = 5e-4
@@ -101,7 +101,6 @@ def mirror_images(surfaces: Mapping[str, Surface]) -> dict[str, tuple[str, IntAr
     """
     from scipy.spatial import cKDTree
 
-    names = list(surfaces)
     points = np.concatenate([surface.vertices for surface in surfaces.values()])
     middle = points.mean(axis=0)
     tree = cKDTree(points)
@@ -117,6 +116,21 @@ def mirror_images(surfaces: Mapping[str, Surface]) -> dict[str, tuple[str, IntAr
     place = join_labels(len(points), *tree.query_pairs(SAME_PLACE, output_type="ndarray").T)
     away, nearest = tree.query(reflected(points, axis, float(middle @ axis)))
     opposite = np.where(away < 2.0 * SAME_PLACE, place[nearest], -1)
+    return match_images(surfaces, place, opposite)
+
+
+def match_images(
+    surfaces: Mapping[str, Surface], place: IntArray, opposite: IntArray
+) -> dict[str, tuple[str, IntArray]]:
+    """Return for each piece its mirror image, perhaps itself, and for each of its vertices the image's; without pieces that have none.
+
+    Matched face by face: along a line at which a piece is cut open, a vertex is two of the piece.
+
+    Args:
+        surfaces: of the pieces.
+        place, opposite: of the vertices of all, one piece after another, a number of their place and of its mirror image, -1 for none.
+    """
+    names = list(surfaces)
     first = np.cumsum([0, *(len(surface.vertices) for surface in surfaces.values())])
     where: dict[frozenset[int], tuple[int, dict[int, int]]] = {}
     for number, surface in enumerate(surfaces.values()):

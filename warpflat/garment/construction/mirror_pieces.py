@@ -4,27 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from warpflat.core import FloatArray, arc_lengths
+from warpflat.garment.construction.edges import SAME_LINE
 from warpflat.garment.construction.mirror import mirror_plane
 from warpflat.pattern import Pattern, Piece, Seam, SeamSide
 
 if TYPE_CHECKING:
     from warpflat.garment.construction.garment import Garment
 
-__all__ = ["draw_pairs_once", "evened"]
+__all__ = ["draw_pairs_once"]
 
-AnyGarment = TypeVar("AnyGarment", bound="Garment")
-
-#: Edges of a pair that is cut by one pattern agree in length, up to each of their points, within this [m].
-SAME_LENGTH = 5e-5
 # A plane of symmetry whose normal has this cosine to x at least is that between left and right.
 _UPRIGHT = 0.8
-# What rests farther [m] from the mean of itself and its mirror image is not meant to be symmetric.
-_EVEN = 2.5e-4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,26 +35,6 @@ class _MirrorPair:
     name: str
     of: str
     edges: Mapping[str, str]
-
-
-def evened(garment: AnyGarment) -> AnyGarment:
-    """Return a garment with each piece as the mean of itself and its mirror image, if all pieces have one.
-
-    A relaxation ends as far to the left or right of its symmetric rest as its tolerance leaves, some hundredths of a millimetre.
-    """
-    mates = {name: mate for pair in garment.pairs for name, mate in (pair, pair[::-1])}
-    pieces = {}
-    for name, piece in garment.pieces.items():
-        mate = mates.get(name, name)
-        images = garment.mirror_vertices(name, mate)
-        if images is None:
-            return garment
-        here, there = piece.positions, garment.pieces[mate].positions[images] * [-1.0, 1.0]
-        move = 0.5 * ((there - there.mean(axis=0)) - (here - here.mean(axis=0)))
-        if np.abs(move).max() > _EVEN:
-            return garment
-        pieces[name] = replace(piece, positions=here + move)
-    return replace(garment, pieces=pieces)
 
 
 def draw_pairs_once(
@@ -102,8 +77,7 @@ def draw_pairs_once(
         return pattern, ()
     (garment, *_), points, images = garments.values(), list[FloatArray](), list[FloatArray]()
     for pair in pairs:
-        partners = garment.mirror_vertices(pair.of, pair.name)
-        assert partners is not None  # they are a pair
+        _, partners = garment.images[pair.of]
         points.append(garment.pieces[pair.of].network.surface.vertices)
         images.append(garment.pieces[pair.name].network.surface.vertices[partners])
     normal, off = mirror_plane(np.concatenate(points), np.concatenate(images))
@@ -155,16 +129,16 @@ def _sewn_once(seams: Sequence[Seam], mirror_pairs: Sequence[_MirrorPair]) -> tu
 def _matching_edges(garment: Garment, pieces: Sequence[Piece], first: str, second: str) -> dict[str, str] | None:
     """Return the first piece's edge for each of the second's; None if one pattern does not serve for both."""
     one, two = (next(piece for piece in pieces if piece.name == name) for name in (first, second))
-    partners = garment.mirror_vertices(first, second)
+    _, partners = garment.images[first]
     edges: dict[str, str] = {}
     for edge in one.edges:
-        if partners is None or edge.vertices is None:
+        if edge.vertices is None:
             return None
         row = partners[np.asarray(edge.vertices)][::-1]
         image = next((e for e in two.edges if e.vertices is not None and np.array_equal(e.vertices, row)), None)
         if image is None or (image.kind, image.width) != (edge.kind, edge.width):
             return None
-        if np.abs(arc_lengths(image.points[::-1]) - arc_lengths(edge.points)).max() > SAME_LENGTH:
+        if np.abs(arc_lengths(image.points[::-1]) - arc_lengths(edge.points)).max() > SAME_LINE:
             return None
         edges[image.name] = edge.name
     return edges if len(edges) == len(two.edges) else None

@@ -11,13 +11,21 @@ from typing import TYPE_CHECKING, Any
 from warpflat._version import __version__
 from warpflat.core import (
     InputError,
+    LeftOut,
+    file_in,
     foreign_words,
     format_count,
+    listening_to_left_out,
     make_file_name,
     nearest,
+    optional_step,
     other_kind_words,
+    output_folder,
     plain_letters,
+    record_file,
     report_activity,
+    write_json,
+    write_report,
 )
 from warpflat.garment.construction.edge_rules import EdgeRules
 from warpflat.garment.construction.form_garment import FormGarment
@@ -229,8 +237,6 @@ def export_patterns(
         InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", an allowance of a pattern that
             has its own, or the folder cannot be written.
     """
-    from warpflat.core import file_in
-
     for format in formats:
         if format not in FORMATS:
             raise InputError(f"unknown format {format!r}; {nearest(format, FORMATS)}")
@@ -291,7 +297,6 @@ def _rewritten(
 
     `over_itself` is whether pattern.json may be written over itself, as it may be where that is asked for.
     """
-    from warpflat.core import output_folder, record_file, write_report
     from warpflat.pattern import PATTERN_ENDINGS, read_drafted
 
     is_file = source.suffix.lower() in PATTERN_ENDINGS and not source.is_dir()
@@ -326,7 +331,6 @@ def _write_pattern(
     make: Callable[[], tuple[Pattern, tuple[str, ...]]], to: str | Path, name: str, options: PatternOptions
 ) -> WrittenPattern:
     """Make, draft and write a pattern; what cannot be drawn or written of it is left out (:func:`warpflat.core.output.optional_step`)."""
-    from warpflat.core import LeftOut, file_in, listening_to_left_out, optional_step, output_folder
     from warpflat.pattern import MEET, TOLERANCE, cut_list, draft_garment, too_many_sheets, walk_seams
 
     if not options.formats and options.cloth is None:
@@ -455,7 +459,6 @@ def _write(
     english: bool = False,
 ) -> tuple[str, tuple[str, ...]]:
     """Write one file and return its name, and what the format leaves out."""
-    from warpflat.core import file_in
     from warpflat.pattern import write_dxf, write_garmentcode, write_pattern_json, write_pdf, write_plt, write_svg
 
     start, _, ending = FORMATS[kind].partition("{}")
@@ -492,7 +495,6 @@ def _marker(
 
     Returns names, notes and the measures of each marker, or why there is none.
     """
-    from warpflat.core import file_in, optional_step, write_json
     from warpflat.pattern import Stripes, cloths_of, make_marker, write_marker_svg
 
     report_activity(f"laying the marker, {seconds} s at most")

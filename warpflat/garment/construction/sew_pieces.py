@@ -6,11 +6,11 @@ import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
-from warpflat.core import BoolArray, FloatArray, InputError, arc_lengths, find_unused_name
+from warpflat.core import BoolArray, InputError, IntArray, arc_lengths, find_unused_name
 from warpflat.flat import SAME_PLACE, Flattening, Layer, RelaxOptions, Surface, border_loops, join_labels, lies_within
 from warpflat.garment.construction.border_seams import BorderSeam, surface_seams
 from warpflat.garment.construction.closed_cuts import seams_of_cuts
@@ -378,31 +378,24 @@ class _BorderEdges:
     def __init__(self, surfaces: Mapping[str, Surface], without: Collection[tuple[str, int, int]]) -> None:
         from scipy.spatial import cKDTree
 
-        self.names, self.tail, self.head = list[str](), list[int](), list[int]()
-        self.next, self.before = list[int](), list[int]()
-        points, piece, loops, arcs, around = [], list[int](), list[int](), list[FloatArray](), list[float]()
-        for name, surface in surfaces.items():
-            for loop in border_loops(surface.faces):
-                first, count = len(self.tail), len(loop)
-                self.names += [name] * count
-                self.tail += loop.tolist()
-                self.head += np.roll(loop, -1).tolist()
-                self.next += [first + (k + 1) % count for k in range(count)]
-                self.before += [first + (k - 1) % count for k in range(count)]
-                points.append(surface.vertices[loop])
-                arc = arc_lengths(surface.vertices[np.append(loop, loop[0])])
-                arcs.append(arc[:-1])
-                piece += [len(set(self.names)) - 1] * count
-                loops += [len(points)] * count
-                around += [float(arc[-1])] * count
-        tails = np.concatenate(points)
+        loops = [(name, loop) for name, surface in surfaces.items() for loop in border_loops(surface.faces)]
+        sizes = np.array([len(loop) for _, loop in loops])
+        first = np.repeat(np.cumsum(sizes) - sizes, sizes)
+        place, count = np.arange(len(first)) - first, np.repeat(sizes, sizes)
+        tail, following = np.concatenate([loop for _, loop in loops]), first + (place + 1) % count
+        arcs = [arc_lengths(surfaces[name].vertices[loop], closed=True) for name, loop in loops]
+        tails = np.concatenate([surfaces[name].vertices[loop] for name, loop in loops])
+        self.names = [name for name, loop in loops for _ in range(len(loop))]
+        self.tail, self.head = tail.tolist(), tail[following].tolist()
+        self.next, self.before = following.tolist(), (first + (place - 1) % count).tolist()
         #: #E by 2 by 3 [m]; #E, piece and loop; #E, the arc length along the loop before the edge, and of the whole loop [m].
-        self.ends = np.stack([tails, tails[self.next]], axis=1)
-        self.piece, self.loop = np.array(piece), np.array(loops)
-        self.arc, self.around = np.concatenate(arcs), np.array(around)
+        self.ends = np.stack([tails, tails[following]], axis=1)
+        self.piece = np.repeat([list(surfaces).index(name) for name, _ in loops], sizes)
+        self.loop = np.repeat(np.arange(len(loops)), sizes)
+        self.arc, self.around = np.concatenate([arc[:-1] for arc in arcs]), np.repeat([arc[-1] for arc in arcs], sizes)
         pairs = cKDTree(tails).query_pairs(SAME_PLACE, output_type="ndarray")
-        place = join_labels(len(self.tail), *pairs.T).tolist()
-        self._ends = [(place[edge], place[self.next[edge]]) for edge in range(len(self.tail))]
+        places = join_labels(len(tail), *pairs.T).tolist()
+        self._ends = [(places[edge], places[self.next[edge]]) for edge in range(len(tail))]
         here: dict[tuple[int, ...], list[int]] = {}
         for edge, ends in enumerate(self._ends):
             own = sorted((self.tail[edge], self.head[edge]))
@@ -453,14 +446,11 @@ class _BorderEdges:
                     first = [*first, following] if step is self.next else [following, *first]
             yield first, [self._partner[one] for one in first]
 
-    def chains(
-        self, first: Sequence[int], second: Sequence[int]
-    ) -> tuple[np.ndarray[Any, np.dtype[np.int32]], np.ndarray[Any, np.dtype[np.int32]]]:
+    def chains(self, first: Sequence[int], second: Sequence[int]) -> tuple[IntArray, IntArray]:
         """Return the vertices along two rows of edges that meet, in the same order in space; the first runs as its border does."""
-        against = self._ends[first[0]] != self._ends[second[0]]
+        starts, ends = (
+            (self.tail, self.head) if self._ends[first[0]] == self._ends[second[0]] else (self.head, self.tail)
+        )
         one = [*(self.tail[edge] for edge in first), self.head[first[-1]]]
-        if against:
-            other = [*(self.head[edge] for edge in second), self.tail[second[-1]]]
-        else:
-            other = [*(self.tail[edge] for edge in second), self.head[second[-1]]]
+        other = [*(starts[edge] for edge in second), ends[second[-1]]]
         return np.array(one, dtype=np.int32), np.array(other, dtype=np.int32)

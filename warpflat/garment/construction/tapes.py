@@ -10,15 +10,16 @@ import numpy as np
 
 from warpflat.core import FloatArray, IntArray, segment_lengths
 from warpflat.flat import SKIN_LENGTH, half_edges_of
+from warpflat.garment.mannequin.slicer import UP, plane_axes
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.forms import FormResult
     from warpflat.garment.mannequin.layout import Layout
 
-__all__ = ["ALONG", "UPRIGHT", "PieceEdges", "RowEdges", "Tape", "stretch_tape"]
+__all__ = ["ALONG", "PieceEdges", "RowEdges", "Tape", "stretch_tape"]
 
-#: The axis of the trunk, and that of a tape which follows its line wherever that rises.
-UPRIGHT, ALONG = np.array([0.0, 1.0, 0.0]), np.zeros(3)
+#: The axis of a tape which follows its line wherever that rises.
+ALONG = np.zeros(3)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,7 +63,7 @@ class PieceEdges:
         self._ends = np.concatenate(ends)[order]
         self._piece = np.repeat(np.arange(len(ends)), [len(edges) for edges in ends])[order]
 
-    def along(self, row: IntArray, axis: FloatArray = UPRIGHT) -> RowEdges | None:
+    def along(self, row: IntArray, axis: FloatArray = UP) -> RowEdges | None:
         """Return the edges of pieces along a closed row; None where the pieces do not go all around.
 
         The right half of a half piece is its left one. Where the row slopes on the form, as at the bust under a lowered
@@ -120,7 +121,7 @@ class Tape:
         return float(self.edges.sum())
 
 
-def stretch_tape(points: FloatArray, axis: FloatArray = UPRIGHT) -> Tape:
+def stretch_tape(points: FloatArray, axis: FloatArray = UP) -> Tape:
     """Return a tape around a closed row of a body, the outline of its convex hull seen along an axis.
 
     Args:
@@ -129,9 +130,7 @@ def stretch_tape(points: FloatArray, axis: FloatArray = UPRIGHT) -> Tape:
     """
     from scipy.spatial import ConvexHull
 
-    across = np.cross(axis, [1.0, 0.0, 0.0] if abs(axis[0]) < 0.9 else [0.0, 0.0, 1.0])
-    across /= np.linalg.norm(across)
-    flat = points @ np.column_stack([across, np.cross(axis, across)])
+    flat = points @ plane_axes(axis).T
     # In a hull's own order around, the vertices of a simple row come as they come in the row.
     held = np.sort(ConvexHull(flat).vertices)
     along = np.concatenate([[0.0], np.cumsum(segment_lengths(flat, closed=True))])

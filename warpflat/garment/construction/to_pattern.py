@@ -24,12 +24,14 @@ from warpflat.core import (
     optional_step,
     polyline_length,
     quote_value,
+    unit,
 )
 from warpflat.flat import (
     SAME_PLACE,
     are_curved,
     border_loops,
     fish_eye_measure,
+    grain_axes,
     join_labels,
     open_length,
     pull_back,
@@ -41,7 +43,7 @@ from warpflat.garment.construction.closed_cuts import CLOSED, are_closed, close_
 from warpflat.garment.construction.darts import pleat_depths
 from warpflat.garment.construction.ease import measure_ease
 from warpflat.garment.construction.edge_rules import EdgeRules
-from warpflat.garment.construction.edges import lengths_of, with_pieces
+from warpflat.garment.construction.edges import SHORT, lengths_of, with_pieces
 from warpflat.garment.construction.equal_pieces import draw_equal_pieces_once
 from warpflat.garment.construction.facings import STAND, Stand
 from warpflat.garment.construction.finishing import finish_edges, hem_rises
@@ -50,7 +52,7 @@ from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.form_plan import EdgePlan, check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.construction.line_drawing import describe_worn
 from warpflat.garment.construction.mark_openings import mark_openings
-from warpflat.garment.construction.mirror_pieces import draw_pairs_once, evened
+from warpflat.garment.construction.mirror_pieces import draw_pairs_once
 from warpflat.garment.construction.openings import one_sided, place_opening
 from warpflat.garment.construction.pockets import add_pockets
 from warpflat.garment.construction.strips import CLOTH_WIDTH
@@ -96,8 +98,8 @@ GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
 _MOST_EDGES = 8
 #: A piece hangs this far [m] in front of its surface, if its border spans the plane by this share at least.
 BESIDE, ALIGNED = 0.05, 1e-3
-#: How a note on a seam of a mesh begins that its pattern lacks; shorter stretches [m] are not told.
-LACKING, _LACKING = "not sewn in the pattern:", 1e-3
+#: How a note on a seam of a mesh begins that its pattern lacks.
+LACKING = "not sewn in the pattern:"
 # How a note on a pattern begins that does not show how it is worn.
 _NO_DRAWING = "the guide has no line drawing of the garment"
 # What lines along a border are called that nobody has named, with the numbers of their stretches.
@@ -273,14 +275,14 @@ def _drawn_on_forms(
     plans = {size: plan_form(garment.form, rules) for size, garment in garments.items()}
     plan = next(iter(plans.values()))
     # Relaxation keeps a piece upright, but not in its place: the lower ends of its datum lie on each other in all sizes.
-    laid, evened_sample = dict[str, FormGarment](), evened(sample)
+    laid, there = dict[str, FormGarment](), sample.evened()
     for size, garment in garments.items():
-        moved, even = {}, evened(garment)
-        for piece, flat in even.pieces.items():
-            there = evened_sample.pieces[piece]
-            offset = there.positions[there.datum[0]] - flat.positions[flat.datum[0]]
-            moved[piece] = replace(flat, positions=np.round(flat.positions + offset, _DECIMALS))
-        laid[size] = replace(even, pieces=moved)
+        moved = {}
+        for piece, even in garment.evened().items():
+            flat = garment.pieces[piece]
+            offset = there[piece][sample.pieces[piece].datum[0]] - even[flat.datum[0]]
+            moved[piece] = replace(flat, positions=np.round(even + offset, _DECIMALS))
+        laid[size] = replace(garment, pieces=moved)
     # Half pieces whose fold strays from straight in some size, and by how much [m] at most.
     bent: dict[str, float] = {}
     for garment in laid.values():
@@ -477,8 +479,6 @@ def grain_of(outline: FloatArray, flat: Flattening, datum: FloatArray | None = N
         flat: the piece.
         datum: #P by 2 [m]; None if it does not lie inside the piece.
     """
-    from warpflat.flat import grain_axes
-
     x, y = grain_axes(flat.grain_angle)[0]
     turn = np.array([[y, -x], [x, y]])
     if datum is not None:
@@ -650,7 +650,7 @@ def _clear_of_holes(grain: FloatArray, piece: Piece) -> FloatArray:
     """Move the grain line aside as far as it takes to keep off holes and fish-eye darts."""
     import shapely
 
-    along = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
+    along = unit(grain[1] - grain[0])
     across = np.array([along[1], -along[0]])
     free = shapely.Polygon(piece.outline, [hole.points for hole in piece.holes]).buffer(-GRAIN_CLEAR)
     for step in range(31):
@@ -771,7 +771,7 @@ def _lacking_seams(garment: Garment, pattern: Pattern) -> list[tuple[Stitching, 
         lost = [None not in (one, other) and (one != other or one == -1) for one, other in zip(*numbers, strict=True)]
         length = np.linalg.norm(np.diff(layouts[0][pair.vertices[0]], axis=0), axis=1)
         for run in np.split(np.arange(len(lost)), np.flatnonzero(np.diff(lost)) + 1):
-            if lost[run[0]] and length[run].sum() > _LACKING:
+            if lost[run[0]] and length[run].sum() > SHORT:
                 found.append((pair, run.astype(np.int32)))
     return found
 

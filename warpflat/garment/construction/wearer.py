@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core import FloatArray, IntArray, weighted_percentiles
-from warpflat.garment.construction.tapes import UPRIGHT, PieceEdges, stretch_tape
+from warpflat.garment.construction.tapes import PieceEdges, stretch_tape
 from warpflat.garment.mannequin.layout import QUARTERS
+from warpflat.garment.mannequin.slicer import UP
 from warpflat.pattern import face_areas
 
 if TYPE_CHECKING:
@@ -208,7 +209,7 @@ def body_rows(mannequin: Mannequin) -> Iterator[tuple[tuple[str, str], IntArray,
     levels = {name: row for name, row in layout.level_row.items() if row <= last}
     heights = mannequin.vertices[layout.rings[: last + 1], 1].mean(axis=1)
     for row in range(last, -1, -1):
-        yield _row_name(levels, row, heights), layout.rings[row], quarters, UPRIGHT
+        yield _row_name(levels, row, heights), layout.rings[row], quarters, UP
     limbs = (
         ("arms", layout.arms, layout.arm_row, "biceps", None),
         ("legs", layout.legs, layout.leg_row, "leg_thigh", layout.to_outseam),

@@ -10,16 +10,14 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest, polyline_length
+from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest, polyline_length, unit
 from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS, RING_LEVELS, Layout
-from warpflat.garment.mannequin.profiles import convex_girth, scale_to_girth
-from warpflat.garment.mannequin.sheet import fill_fork, sheet_laplacian
+from warpflat.garment.mannequin.profiles import convex_girth, scale_to_girth, upper_hull
+from warpflat.garment.mannequin.sheet import fill_fork, fill_sheet, sheet_laplacian
 
 __all__ = ["Adjustment", "adjusted_vertices", "blend_forms", "bridge_row", "bridge_rows", "is_tight", "rule_rows"]
 
@@ -150,8 +148,7 @@ def _changed(row: FloatArray, other: FloatArray | None, change: Adjustment, ease
         if girth <= 0.2 * convex_girth(row):
             raise InputError(f"form: {grow * 100:g} cm of ease leave no girth (profile is {girth * 100:.0f} cm then)")
         tangent = np.roll(new, -1, axis=0) - np.roll(new, 1, axis=0)
-        normal = np.column_stack([-tangent[:, 2], np.zeros(len(new)), tangent[:, 0]])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        normal = unit(np.column_stack([-tangent[:, 2], np.zeros(len(new)), tangent[:, 0]]))
         outward = np.sign(np.sum(normal * (new - new.mean(axis=0))))
         new = scale_to_girth(new + outward * normal * grow / (2.0 * math.pi), girth)
     new[:, 1] += change.raise_cm / 100.0
@@ -255,29 +252,16 @@ def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: tuple[
             row = grid[0]
             distance = chest[0].offset_cm / 100.0 + chest[1] / 200.0 / math.pi
             tangent = np.gradient(body[row], axis=0)
-            normals = np.column_stack([-tangent[:, 2], np.zeros(len(row)), tangent[:, 0]])
-            normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+            normals = unit(np.column_stack([-tangent[:, 2], np.zeros(len(row)), tangent[:, 0]]))
             move[row] = distance * normals + (chest[0].scale - 1.0) * (body[row] - body[row].mean(axis=0))
             held[local[row]] = True
-    _solve_moves(move, ids, laplacian, held)
+    fill_sheet(move, layout, ids, laplacian[~held], np.flatnonzero(~held))
     loops = _mitre_underarms(move, layout, body)
     if loops is not None:
         held[local[loops]] = True
-        _solve_moves(move, ids, laplacian, held)
+        fill_sheet(move, layout, ids, laplacian[~held], np.flatnonzero(~held))
     out[ids] = body[ids] + move[ids]
     out[layout.rings[: bust + 1]] = (body + move)[layout.rings[: bust + 1]]
-
-
-def _solve_moves(move: FloatArray, ids: IntArray, laplacian: Any, held: NDArray[np.bool_]) -> None:
-    """Set the displacements of the sheet's vertices that are not held to the smoothest ones between those that are."""
-    from scipy import sparse
-    from scipy.sparse.linalg import spsolve
-
-    operator = laplacian[~held]
-    unknown, known = operator[:, np.flatnonzero(~held)], operator[:, np.flatnonzero(held)]
-    right = -(known @ move[ids[held]])
-    solved = spsolve((unknown.T @ unknown + 1e-12 * sparse.identity(unknown.shape[1])).tocsc(), unknown.T @ right)
-    move[ids[~held]] = np.asarray(solved).reshape(-1, 3)
 
 
 def _mitre_underarms(move: FloatArray, layout: Layout, body: FloatArray) -> IntArray | None:
@@ -293,14 +277,12 @@ def _mitre_underarms(move: FloatArray, layout: Layout, body: FloatArray) -> IntA
     loops = []
     for side, column in (("left", layout.quarter), ("right", 3 * layout.quarter)):
         beside, loop = bust[column], layout.arms[side][0]
-        of_trunk = normals[beside] * [1.0, 0.0, 1.0]
-        of_trunk /= np.linalg.norm(of_trunk)
+        of_trunk = unit(normals[beside] * [1.0, 0.0, 1.0])
         out = float(move[beside] @ of_trunk)
         if out <= 0.0:
             return None
         # Beyond the rounded web of the armpit.
-        bisector = of_trunk + normals[layout.arms[side][layout.arm_row["biceps"] // 2, 0]]
-        bisector /= np.linalg.norm(bisector)
+        bisector = unit(of_trunk + normals[layout.arms[side][layout.arm_row["biceps"] // 2, 0]])
         wished = out / max(float(bisector @ of_trunk), _LEAST_MITRE) * bisector
         more = wished - move[loop[0]]
         move[loop[at % len(loop)]] += near[:, None] * more
@@ -462,23 +444,13 @@ def _hang(out: FloatArray, layout: Layout, grid: IntArray, near: FloatArray | No
     """
     rows = out[grid]
     arc = np.cumsum(np.linalg.norm(np.diff(rows, axis=0, prepend=rows[:1]), axis=2), axis=0)
-    chord = rows[-1] - rows[0]
-    along = chord / np.linalg.norm(chord, axis=1, keepdims=True)
+    along = unit(rows[-1] - rows[0])
     outward = vertex_normals(out, layout.body_faces)[grid].mean(axis=0)
     outward -= along * np.einsum("ck,ck->c", along, outward)[:, None]
     way, height = (np.einsum("rck,ck->rc", rows - rows[0], axis) for axis in (along, outward))
     hung = rows.copy()
     for column in range(grid.shape[1]):
-        # The upper hull of the column's profile (Andrew's monotone chain).
-        touch: list[int] = []
-        profile = np.stack([way[:, column], height[:, column]], axis=1)
-        for row, point in enumerate(profile):
-            while len(touch) > 1:
-                (x0, y0), (x1, y1) = point - profile[touch[-2]], profile[touch[-1]] - profile[touch[-2]]
-                if x1 * y0 < x0 * y1:
-                    break
-                touch.pop()
-            touch.append(row)
+        touch = upper_hull(np.stack([way[:, column], height[:, column]], axis=1))
         for axis in range(3):
             hung[:, column, axis] = np.interp(arc[:, column], arc[touch, column], rows[touch, column, axis])
     share = (arc / arc[-1])[..., None]

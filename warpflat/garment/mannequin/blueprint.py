@@ -6,11 +6,19 @@ Size tables and scans both answer with a :class:`Blueprint`; one builder lays th
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
+
+import numpy as np
 
 from warpflat.core import FloatArray
 
-__all__ = ["ArmCurves", "Blueprint", "LegCurves", "LegProfile", "Profile", "QuarterCurves"]
+__all__ = ["NOTCH", "ArmCurves", "Blueprint", "LegCurves", "LegProfile", "Profile", "QuarterCurves", "mirrored"]
+
+#: How high up the armhole the across-chest row ends; the armhole runs slantwise there, which leaves the quads room.
+NOTCH = 0.22
+
+_Curves = TypeVar("_Curves", "QuarterCurves", "ArmCurves")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,12 +56,12 @@ class QuarterCurves:
     """
 
     neckline: FloatArray
-    bend: float
     shoulder: FloatArray
     armhole: FloatArray
     notch: float
     chest: FloatArray
     centre: FloatArray
+    bend: float = 0.52
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,6 +82,13 @@ class ArmCurves:
     def by_place(self) -> dict[float, FloatArray]:
         """All curves by their place, from the biceps to the wrist."""
         return dict(sorted({0.0: self.biceps, 1.0: self.elbow, 2.0: self.wrist, **self.between}.items()))
+
+
+def mirrored(curves: _Curves) -> _Curves:
+    """Return the curves of the other side of a symmetric body."""
+    lines = {name: line for name, line in vars(curves).items() if isinstance(line, np.ndarray)}
+    flipped: dict[str, Any] = {name: line * [-1.0, 1.0, 1.0] for name, line in lines.items()}
+    return replace(curves, **flipped)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, FloatArray, IntArray
+from warpflat.core import BoolArray, FloatArray, unit
 from warpflat.flat import join_labels
 from warpflat.garment.mannequin.body_model import BodyModel, finer_body
 
@@ -92,24 +92,19 @@ def model_places() -> Places:
             model.mean[model.count + model.joints.index(f"{j}.{letter}")] for j in ("upperarm01", "lowerarm01")
         )
         tip = mean[strips[f"arm {side}"]][np.argmax(sign * x[strips[f"arm {side}"]])]
-        upper, lower = (way / np.linalg.norm(way) for way in (elbow - shoulder, tip - elbow))
+        upper, lower = unit(elbow - shoulder), unit(tip - elbow)
         before = (mean - elbow) @ (upper + lower) < 0.0
         along = np.where(own, np.where(before, (mean - elbow) @ upper, (mean - elbow) @ lower), along)
         on_side = (sign * x[triangles] > -1e-6).all(axis=1)
         # Below the armpit an arm is what hangs together with the hand.
         below = triangles[(y[triangles] < y[meeting(mean, mean, sign)]).all(axis=1)]
-        hangs = parts_of(below, len(mean))
+        hangs = join_labels(len(mean), below[:, :2].ravel(), below[:, 1:].ravel())
         arm = (hangs == hangs[np.argmax(sign * x)])[triangles].any(axis=1)
         halves[side] = on_side & ~arm & (on_arm[triangles] < 0.5).any(axis=1)
         arms[side] = on_side & (on_arm[triangles] > _OF_ARM).any(axis=1)
     return Places(
         mean=mean, strips=strips, along=along, halves=halves, arms=arms, middle=np.flatnonzero(np.abs(x) < 1e-6)
     )
-
-
-def parts_of(triangles: NDArray[np.int64], count: int) -> IntArray:
-    """Return #count, a label for each vertex, the same for vertices that triangles join."""
-    return join_labels(count, *np.concatenate([triangles[:, :2], triangles[:, 1:]]).T)
 
 
 def meeting(vertices: FloatArray, mean: FloatArray, sign: float) -> int:
@@ -128,7 +123,8 @@ def meeting(vertices: FloatArray, mean: FloatArray, sign: float) -> int:
     low, high = 0, len(rows) - 1
     while low < high:
         middle = (low + high) // 2
-        label = parts_of(triangles[(y[triangles] <= y[rows[middle]]).all(axis=1)], len(y))
+        below = triangles[(y[triangles] <= y[rows[middle]]).all(axis=1)]
+        label = join_labels(len(y), below[:, :2].ravel(), below[:, 1:].ravel())
         low, high = (low, middle) if label[hand] == label[trunk] else (middle + 1, high)
     return int(rows[low])
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from warpflat.core import FloatArray
+from warpflat.core import FloatArray, unit
 
 __all__ = ["BodyModel", "Person", "finer_body", "rotation", "rotation_vector"]
 
@@ -183,8 +183,7 @@ class BodyModel:
         """Return directions at the vertices (#V by 3), given in the standard pose, as they turn with the joints and the body."""
         turn, _ = self.frames(self.shaped(person.shape)[self.count :], person.bend)
         blended = (self.weights @ turn.reshape(-1, 9)).reshape(-1, 3, 3)
-        out = np.matmul(blended, normals[:, :, None])[:, :, 0] @ person.turn.T
-        return np.asarray(out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12))
+        return unit(np.matmul(blended, normals[:, :, None])[:, :, 0] @ person.turn.T)
 
     @cached_property
     def _by_shape(self) -> FloatArray:

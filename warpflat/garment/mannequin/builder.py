@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
 import numpy as np
 
-from warpflat.core import FloatArray, IntArray, arc_lengths, polyline_length, resample
+from warpflat.core import FloatArray, IntArray, arc_lengths, polyline_length, resample, unit
 from warpflat.garment.mannequin.blueprint import Blueprint, LegCurves, LegProfile, Profile
 from warpflat.garment.mannequin.layout import LEG_LEVELS, QUARTERS, RING_LEVELS, Layout
 from warpflat.garment.mannequin.profiles import convex_girth, scale_to_girth
-from warpflat.garment.mannequin.sheet import fill_fork, sheet_laplacian
+from warpflat.garment.mannequin.sheet import fill_fork, fill_sheet, sheet_laplacian
 
 __all__ = ["build_trunk", "build_vertices", "girth_ring", "quarter_fractions"]
 
 
-# How strongly the sheet is drawn to the across-chest rows and centre lines, and to a scan, against one for its own
-# smoothness, on a grid of 10 mm. The operator shrinks with the square of the edge; a curve's and a sheet's count of
-# vertices with its inverse and the square of that: hence the powers by which the weights follow the resolution.
-_GUIDE = 0.01
-_ATTRACT = 0.25
-_ATTRACT_ROUNDS = 4
+# How strongly the sheet is drawn to the across-chest rows and centre lines, against one for its own smoothness, on a grid of 10 mm. The
+# operator shrinks with the square of the edge, a curve's count of vertices with its inverse: hence the power by which it follows the
+# resolution. And how often the sheet is drawn to a scan.
+_GUIDE, _ATTRACT_ROUNDS = 0.01, 4
 # So far [m] below the underarm the bust's row meets the side, where the rows below it keep this share of the height: a dart
 # from there keeps off the armhole.
 _DART_ROOM, _LEAST_SHARE = 0.043, 0.2
@@ -205,15 +204,12 @@ def _set_arms(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> Non
         between = np.arange(rows["biceps"], rows["wrist"] + 1)
         vertices[grid[between]] = PchipInterpolator(at, np.stack(rings), axis=0)(between)
         # From the armhole the sleeve leaves along the shoulder at the top and along the arm at the bottom.
-        axis = rings[int(np.searchsorted(places, 1.0))].mean(axis=0) - rings[0].mean(axis=0)
-        axis = axis / np.linalg.norm(axis)
+        axis = unit(rings[int(np.searchsorted(places, 1.0))].mean(axis=0) - rings[0].mean(axis=0))
         reach = np.linalg.norm(rings[0] - hole, axis=1)[:, None]
         high = ((hole[:, 1] - hole[:, 1].min()) / max(np.ptp(hole[:, 1]), 1e-9))[:, None]
-        seam = hole[half] - vertices[layout.lines[f"shoulder {side}"][0]]
-        seam = seam / np.linalg.norm(seam)
+        seam = unit(hole[half] - vertices[layout.lines[f"shoulder {side}"][0]])
         outward = np.array([np.sign(axis[0]), 0.0, 0.0])
-        leave = high * (0.8 * seam + 0.2 * axis) + (1 - high) * (0.5 * axis + 0.5 * outward)
-        leave = leave / np.linalg.norm(leave, axis=1, keepdims=True)
+        leave = unit(high * (0.8 * seam + 0.2 * axis) + (1 - high) * (0.5 * axis + 0.5 * outward))
         t = (np.arange(1, rows["biceps"]) / rows["biceps"])[:, None, None]
         h00, h10 = 2 * t**3 - 3 * t**2 + 1, t**3 - 2 * t**2 + t
         h01, h11 = -2 * t**3 + 3 * t**2, t**3 - t**2
@@ -223,7 +219,6 @@ def _set_arms(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> Non
 def _set_sheet(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> None:
     """Set the vertices of chest, blades and shoulders: the smoothest sheet through the bounds that continues the bust's rows."""
     from scipy import sparse
-    from scipy.sparse.linalg import factorized
 
     bust = layout.level_row["bust"]
     ids, laplacian, local = sheet_laplacian(layout, bust - 3)
@@ -234,28 +229,22 @@ def _set_sheet(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> No
         neckline, _, armhole, _, _ = _quarter_ids(layout, name)
         bounds[local[neckline]] = bounds[local[armhole]] = True
     bounds[local[layout.rings[bust - 3]]] = True
-    operator = laplacian[~bounds]
-    smooth = np.zeros((operator.shape[0], 3))
-    coarse = layout.resolution / 0.010
-    guide_weight = _GUIDE * coarse**1.5
+    operator, free = laplacian[~bounds], np.flatnonzero(~known)
     guides, targets = _guides(vertices, layout, blueprint)
-    guide = sparse.identity(n).tocsr()[local[guides]] * guide_weight
-    free, fixed = np.flatnonzero(~known), np.flatnonzero(known)
+    weight = _GUIDE * (layout.resolution / 0.010) ** 1.5
+
+    def guided(weight: float) -> tuple[Any, FloatArray]:
+        guide = weight * sparse.identity(n).tocsr()[local[guides]]
+        return sparse.vstack([operator, guide]), np.vstack([np.zeros((operator.shape[0], 3)), weight * targets])
+
     # The first sheet follows the guides alone: there is none yet to draw to the body.
-    matrix = sparse.vstack([operator, guide * 5.0]).tocsr()
-    unknown, constant = matrix[:, free], matrix[:, fixed] @ vertices[ids[fixed]]
-    right = np.vstack([smooth, 5.0 * guide_weight * targets]) - constant
-    position = factorized((unknown.T @ unknown).tocsc())(np.asarray(unknown.T @ right))
+    matrix, target = guided(5.0 * weight)
+    fill_sheet(vertices, layout, ids, matrix, free, target=target)
     if blueprint.attract is not None:
-        attract_weight = _ATTRACT * coarse**2
-        matrix = sparse.vstack([operator, guide, sparse.identity(n).tocsr()[free] * attract_weight]).tocsr()
-        unknown, constant = matrix[:, free], matrix[:, fixed] @ vertices[ids[fixed]]
-        solve = factorized((unknown.T @ unknown).tocsc())
-        for _ in range(_ATTRACT_ROUNDS):
-            drawn = attract_weight * blueprint.attract(position)
-            right = np.vstack([smooth, guide_weight * targets, drawn]) - constant
-            position = solve(np.asarray(unknown.T @ right))
-    vertices[ids[free]] = position
+        matrix, target = guided(weight)
+        fill_sheet(
+            vertices, layout, ids, matrix, free, target=target, attract=blueprint.attract, rounds=_ATTRACT_ROUNDS
+        )
 
 
 def _guides(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> tuple[IntArray, FloatArray]:

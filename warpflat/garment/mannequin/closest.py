@@ -1,69 +1,64 @@
-"""The nearest place on a triangle mesh."""
+"""A triangle mesh that answers for its nearest places."""
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.core import FloatArray
-from warpflat.flat import nearest_on_triangles
+from warpflat.core import FloatArray, launch_quietly, unit
+from warpflat.flat import area_vectors, vertex_normals
+from warpflat.kernels.closest import find_closest
 
-__all__ = ["Closest"]
+__all__ = ["Mesh"]
 
 
-class Closest:
-    """Nearest places on a triangle mesh, in two or three dimensions.
+class Mesh:
+    """A triangle mesh that answers, in single precision, for the nearest places on it.
 
     Args:
-        vertices: #V by 2 or 3.
+        vertices: #V by 3 [m].
         triangles: #T by 3.
     """
 
     def __init__(self, vertices: FloatArray, triangles: NDArray[np.int64]) -> None:
-        from scipy.spatial import cKDTree
+        self.vertices, self.triangles = vertices, triangles
+        vectors = area_vectors(vertices, triangles)
+        #: #T [m2], and #T by 3, of the triangles.
+        self.area, self.normals = np.linalg.norm(vectors, axis=1), unit(vectors)
 
-        self.corners = vertices[triangles]
-        self.middles = self.corners.mean(axis=1)
-        self.radius = np.linalg.norm(self.corners - self.middles[:, None], axis=2).max(axis=1)
-        self.tree = cKDTree(self.middles)
+    @cached_property
+    def _tree(self) -> wp.Mesh:
+        return wp.Mesh(
+            points=wp.array(self.vertices, dtype=wp.vec3, device="cpu"),
+            indices=wp.array(self.triangles.ravel(), dtype=wp.int32, device="cpu"),
+        )
 
-    def __call__(self, points: FloatArray) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-        """Return the nearest triangle of every point.
+    @cached_property
+    def _outwards(self) -> FloatArray:
+        return vertex_normals(self.vertices, self.triangles)
 
-        Args:
-            points: #P by 2 or 3.
+    def closest(self, points: FloatArray) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+        """Return the nearest triangle of each point (#P), weights of the nearest place on it (#P by 3), and that place (#P by 3 [m])."""
+        face = wp.empty(len(points), dtype=wp.int32, device="cpu")
+        weight = wp.empty(len(points), dtype=wp.vec3, device="cpu")
+        given = [self._tree.id, wp.array(points, dtype=wp.vec3, device="cpu")]
+        launch_quietly(find_closest, dim=len(points), inputs=given, outputs=[face, weight], device="cpu")
+        found, share = face.numpy().astype(np.int64), weight.numpy().astype(np.float64)
+        return found, share, np.einsum("pk,pka->pa", share, self.vertices[self.triangles[found]])
 
-        Returns:
-            triangle (#P), barycentric weights (#P by 3), distance (#P).
+    def sample(self, count: int) -> tuple[FloatArray, FloatArray]:
+        """Return places spread evenly over the mesh, the same each time, and the normals of their triangles (#P by 3 each)."""
+        random = np.random.default_rng(0)
+        face = random.choice(len(self.triangles), count, p=self.area / self.area.sum())
+        share = random.dirichlet([1.0, 1.0, 1.0], count)
+        return np.einsum("pk,pka->pa", share, self.vertices[self.triangles[face]]), self.normals[face]
+
+    def normals_at(self, face: NDArray[np.int64], weights: FloatArray) -> FloatArray:
+        """Return the unit normals at places on triangles (#P, with weights #P by 3), #P by 3, that change smoothly over the mesh.
+
+        The nearest place is often on an edge, where rounding decides to which of its two triangles it belongs.
         """
-        count = min(12, len(self.middles))
-        _, first = self.tree.query(points, k=count)
-        first = np.reshape(first, (len(points), count))
-        owner = np.repeat(np.arange(len(points)), count)
-        triangle, weights, distance = self._best(points, owner, first.ravel())
-        # Any triangle whose middle lies within the best distance plus the largest triangle's radius may be nearer.
-        near = self.tree.query_ball_point(points, distance + self.radius.max() * (1.0 + 1e-9))
-        sizes = np.array([len(n) for n in near])
-        if (sizes > count).any():
-            owner = np.repeat(np.arange(len(points)), sizes)
-            flat = np.concatenate([np.asarray(n, np.int64) for n in near if n])
-            keep = (
-                np.linalg.norm(points[owner] - self.middles[flat], axis=1)
-                <= distance[owner] + self.radius[flat] + 1e-12
-            )
-            again = np.unique(owner[keep])
-            better = self._best(points, owner[keep], flat[keep])
-            triangle[again], weights[again], distance[again] = better
-        return triangle, weights, distance
-
-    def _best(
-        self, points: FloatArray, owner: NDArray[np.int64], triangles: NDArray[np.int64]
-    ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-        """Return the nearest triangle of each point, among pairs of a point and a triangle that are sorted by point."""
-        weights = nearest_on_triangles(self.corners[triangles], points[owner])
-        place = np.einsum("nk,nkd->nd", weights, self.corners[triangles])
-        distance = np.linalg.norm(place - points[owner], axis=1)
-        order = np.lexsort((triangles, distance, owner))
-        _, first = np.unique(owner[order], return_index=True)
-        chosen = order[first]
-        return triangles[chosen], weights[chosen], distance[chosen]
+        return unit(np.einsum("pk,pka->pa", weights, self._outwards[self.triangles[face]]))

@@ -14,7 +14,8 @@ from warpflat.core import FloatArray
 from warpflat.flat import triangulate
 from warpflat.garment.mannequin.body_landmarks import model_places, near_level, value_at
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body
-from warpflat.garment.mannequin.fit_body import Mesh, fit_body
+from warpflat.garment.mannequin.closest import Mesh
+from warpflat.garment.mannequin.fit_body import fit_body
 from warpflat.garment.mannequin.fit_inside import fit_inside
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.read_body import read_body
@@ -109,8 +110,8 @@ def common_body_of_mannequin(mannequin: Mannequin, *, name: str) -> CommonBody:
     # Without head and feet the model would slide up or down.
     levels = mannequin.levels()
     fit = fit_body(mannequin.vertices, triangles, {name: levels[name].height for name in _LEVELS})
-    mesh, whole = Mesh(mannequin.vertices, triangles), np.zeros(len(triangles), dtype=bool)
-    vertices, _ = lay_on_scan(finer_body()[0] @ BodyModel.load().vertices(fit.person), mesh, whole)
+    mesh = Mesh(mannequin.vertices, triangles)
+    vertices, _ = lay_on_scan(finer_body()[0] @ BodyModel.load().vertices(fit.person), mesh)
     # Laid on the mannequin its levels are some millimetres off: they go where the mannequin has them, and what lies between follows.
     places, heights = model_places(), vertices[:, 1]
     for _ in range(_MOVES):
@@ -123,11 +124,11 @@ def common_body_of_mannequin(mannequin: Mannequin, *, name: str) -> CommonBody:
         )
         move = np.interp(heights, own, [levels[name].height for name in _LEVELS] - own)
         vertices = vertices + np.outer(np.where(arms, 0.0, move), [0.0, 1.0, 0.0])
-        vertices, _ = lay_on_scan(vertices, mesh, whole)
+        vertices, _ = lay_on_scan(vertices, mesh)
         heights = vertices[:, 1]
     # So would the ends of its shoulders and its underarms: a table may have both where no body of that girth has them.
     for _ in range(_MOVES):
-        vertices, _ = lay_on_scan(vertices + _towards_armholes(vertices, mannequin), mesh, whole)
+        vertices, _ = lay_on_scan(vertices + _towards_armholes(vertices, mannequin), mesh)
     far = float(fit.distance[np.isfinite(fit.distance)].mean())
     return CommonBody(name=name, person=fit.person, vertices=vertices, far=far)
 

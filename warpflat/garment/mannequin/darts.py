@@ -203,14 +203,11 @@ def _cloth(layout: Layout, bricks: Sequence[str], opened: Sequence[str] = ()) ->
 
 @functools.lru_cache(maxsize=32)  # one piece is asked for dozens of times while darts are looked for
 def _cloth_of(layout: Layout, bricks: tuple[str, ...], opened: tuple[str, ...]) -> _Cloth:
-    corners = layout.faces[layout.faces_of(bricks)]
-    ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2), axis=1)
-    edges, counts = np.unique(ends, axis=0, return_counts=True)
-    cut = {edge for line in opened for edge in itertools.pairwise(layout.lines[line].tolist())}
-    inner = [(u, v) for u, v in edges[counts == 2].tolist() if (u, v) not in cut and (v, u) not in cut]
+    cut, inside = layout.edges_along(*opened), layout.edges_of(bricks, inside=True)
+    border = layout.edges_of(bricks) - inside | cut
     return _Cloth(
-        inner=frozenset((a, b) for u, v in inner for a, b in ((u, v), (v, u))),
-        border=frozenset(np.unique(edges[counts == 1]).tolist()).union(*cut),
+        inner=frozenset(ends for edge in inside - cut for ends in (edge, edge[::-1])),
+        border=frozenset(itertools.chain.from_iterable(border)),
     )
 
 

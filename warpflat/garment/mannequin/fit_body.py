@@ -12,21 +12,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.core import FloatArray, launch_quietly, unit
+from warpflat.core import FloatArray
 from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.body_landmarks import PLACES, height_weights
 from warpflat.garment.mannequin.body_model import BodyModel, Person, rotation
-from warpflat.kernels.closest import find_closest
+from warpflat.garment.mannequin.closest import Mesh
 
-__all__ = ["FittedBody", "Mesh", "fit_body"]
+__all__ = ["FEW", "SAMPLES", "FittedBody", "fit_body", "step_within"]
 
-# Points on the scan that draw the body to themselves.
-_SAMPLES = 2_500
-# Vertices of the body that are drawn while starts are compared.
-_FEW = 900
+#: Points on a scan or cloth that draw the body to themselves.
+SAMPLES = 2_500
+#: Vertices of the body that are drawn while starts are compared.
+FEW = 900
 # Surfaces face the same way where their normals' product is larger than this.
 _ALIKE = 0.35
 # How much the scan's samples count against the body's vertices.
@@ -47,43 +46,6 @@ _LAST = ((8, 0.04, 0.03),)
 _ARMS = (0.0, 0.5, -0.5, 0.9)
 # Bends [rad] about the axis to the left of hips and knees of a body that sits: on a chair, on a saddle.
 _SEATS = ((-1.5, 1.4), (-1.0, 1.2))
-
-
-class Mesh:
-    """A triangle mesh that answers for the nearest places on it.
-
-    Args:
-        vertices: #V by 3 [m].
-        triangles: #T by 3.
-    """
-
-    def __init__(self, vertices: FloatArray, triangles: NDArray[np.int64]) -> None:
-        self.vertices, self.triangles = vertices, triangles
-        a, b, c = vertices[triangles].transpose(1, 0, 2)
-        cross = np.cross(b - a, c - a)
-        self.area = 0.5 * np.linalg.norm(cross, axis=1)
-        self.normals = cross / np.maximum(2.0 * self.area, 1e-300)[:, None]
-        self._outwards = vertex_normals(vertices, triangles)
-        self._mesh = wp.Mesh(
-            points=wp.array(vertices, dtype=wp.vec3, device="cpu"),
-            indices=wp.array(triangles.ravel(), dtype=wp.int32, device="cpu"),
-        )
-
-    def closest(self, points: FloatArray, reach: float = 1e6) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-        """Return the nearest triangle of each point (#P; -1 where none is within reach [m]), weights (#P by 3), and place (#P by 3 [m])."""
-        face = wp.empty(len(points), dtype=wp.int32, device="cpu")
-        weight = wp.empty(len(points), dtype=wp.vec3, device="cpu")
-        given = [self._mesh.id, wp.array(points, dtype=wp.vec3, device="cpu"), float(reach)]
-        launch_quietly(find_closest, dim=len(points), inputs=given, outputs=[face, weight], device="cpu")
-        found, share = face.numpy().astype(np.int64), weight.numpy().astype(np.float64)
-        return found, share, np.einsum("pk,pka->pa", share, self.vertices[self.triangles[found]])
-
-    def normals_at(self, face: NDArray[np.int64], weights: FloatArray) -> FloatArray:
-        """Return the unit normals at places on triangles (#P, with weights #P by 3), #P by 3, that change smoothly over the mesh.
-
-        The nearest place is often on an edge, where rounding decides to which of its two triangles it belongs.
-        """
-        return unit(np.einsum("pk,pka->pa", weights, self._outwards[self.triangles[face]]))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -133,16 +95,12 @@ def fit_body(
         sits: whether it sits.
     """
     model, mesh = BodyModel.load(), Mesh(vertices, triangles)
-    rng = np.random.default_rng(0)
-    face = rng.choice(len(triangles), _SAMPLES, p=mesh.area / mesh.area.sum())
-    share = rng.dirichlet([1.0, 1.0, 1.0], _SAMPLES)
-    scan = _Scan(
-        mesh=mesh, points=np.einsum("pk,pka->pa", share, vertices[triangles[face]]), normals=mesh.normals[face]
-    )
+    points, facing = mesh.sample(SAMPLES)
+    scan = _Scan(mesh=mesh, points=points, normals=facing)
     # Head, hands and feet count less: hair, shoes and fingers differ from the model's.
     plain = np.concatenate([np.flatnonzero(~model.detail), np.flatnonzero(model.detail)[::_THIN]])
     normals = vertex_normals(model.mean[: model.count], model.triangles)
-    few = plain[:: max(1, len(plain) // _FEW)]
+    few = plain[:: max(1, len(plain) // FEW)]
     coarse, fine = model.only(few), model.only(plain)
     heights = {name: height for name, height in (landmarks or {}).items() if name in PLACES}
     given = np.array([height_weights(name) for name in heights]).reshape(-1, model.count)
@@ -244,15 +202,37 @@ def _step(
         if sits and name.startswith(("upperleg", "lowerleg")):
             bends[joint] = 0.0
     stiffness[count : count + 3 * joints] = bends.ravel()
-    value = np.zeros(len(gradient))
-    value[: count + 3 * joints] = model.departures(person)
-    matrix[np.diag_indices_from(matrix)] += stiffness + 1e-6
-    gradient += stiffness * value
-    free = np.arange(len(gradient)) >= (0 if shapes else count)
-    step = np.zeros(len(gradient))
-    step[free] = np.linalg.solve(matrix[np.ix_(free, free)], -gradient[free])
-    bent = np.abs(step[count : count + 3 * joints]).max()
-    step *= min(1.0, _MOST_BEND / max(bent, 1e-9))
+    step = step_within(model, person, matrix, gradient, stiffness, shapes=shapes, most_bend=_MOST_BEND)
     body = slice(0, model.count)
     mean = float(np.sqrt((weight[body] * residual[body] ** 2).sum() / max(weight[body].sum(), 1e-9)))
     return model.moved(person, step), mean + 0.02 * float(1.0 - alike[body].mean())
+
+
+def step_within(
+    model: BodyModel,
+    person: Person,
+    matrix: FloatArray,
+    gradient: FloatArray,
+    stiffness: FloatArray,
+    *,
+    shapes: bool,
+    most_bend: float,
+) -> FloatArray:
+    """Return the Gauss-Newton step of a person's parameters that draws departures from the mean back, and bends no joint too far.
+
+    Args:
+        model: of the body.
+        person: before the step.
+        matrix, gradient: of the sum of squares.
+        stiffness: how much each parameter is drawn back, by how far it departs.
+        shapes: whether shapes may change.
+        most_bend: of any joint [rad].
+    """
+    count, bends = len(model.shapes), slice(len(model.shapes), len(model.shapes) + 3 * len(model.parents))
+    departures = np.zeros(len(gradient))
+    departures[: bends.stop] = model.departures(person)
+    whole = matrix + np.diag(stiffness + 1e-6)
+    free = slice(0 if shapes else count, None)
+    step = np.zeros(len(gradient))
+    step[free] = np.linalg.solve(whole[free, free], -(gradient + stiffness * departures)[free])
+    return np.asarray(step * min(1.0, most_bend / max(float(np.abs(step[bends]).max()), 1e-9)))

@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from warpflat.core import FloatArray
 from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.body_model import BodyModel, Person, rotation
-from warpflat.garment.mannequin.fit_body import FittedBody, Mesh
+from warpflat.garment.mannequin.closest import Mesh
+from warpflat.garment.mannequin.fit_body import FEW, SAMPLES, FittedBody, step_within
 
 __all__ = ["fit_inside"]
 
-# Samples of the cloth, and vertices of the body that are asked, while starts are compared and at the end.
-_SAMPLES, _FEW, _VERTICES = (600, 2_500), 900, 2_600
+# Samples of the cloth that are asked while starts are compared, and vertices of the body at the end.
+_FEW_SAMPLES, _VERTICES = 600, 2_600
 # The stature that is preferred, and the gap under plain cloth [m].
 _STATURE, _GAP = 1.68, 0.006
 # Cloth and skin face the same way where their normals' product is larger than this.
@@ -46,14 +47,11 @@ def fit_inside(vertices: FloatArray, triangles: NDArray[np.int64]) -> FittedBody
         The body; its distances are those of the cloth's samples from it.
     """
     model, cloth = BodyModel.load(), Mesh(vertices, triangles)
-    rng = np.random.default_rng(0)
-    face = rng.choice(len(triangles), _SAMPLES[1], p=cloth.area / cloth.area.sum())
-    share = rng.dirichlet([1.0, 1.0, 1.0], len(face))
-    points, normals = np.einsum("pk,pka->pa", share, vertices[triangles[face]]), cloth.normals[face]
-    few = slice(0, _SAMPLES[0])
+    points, normals = cloth.sample(SAMPLES)
+    few = slice(0, _FEW_SAMPLES)
     skin = np.flatnonzero(~model.detail)
     of_skin = vertex_normals(model.mean[: model.count], model.triangles)
-    coarse_rows, fine_rows = (skin[:: max(1, len(skin) // count)] for count in (_FEW, _VERTICES))
+    coarse_rows, fine_rows = (skin[:: max(1, len(skin) // count)] for count in (FEW, _VERTICES))
     coarse, fine = model.only(coarse_rows), model.only(fine_rows)
     height, top = float(np.ptp(vertices[:, 1])), float(vertices[:, 1].max())
     started: list[tuple[Person, float]] = []
@@ -120,15 +118,8 @@ def _step(
     held = [0.3 * preference + 0.05 + _HELD.get(name.split(".")[0], 0.0) for name in model.joints]
     stiffness[count : count + 3 * joints] = np.repeat(held, 3)
     stiffness[-1] = 30.0 * preference
-    value = np.zeros(len(gradient))
-    value[: count + 3 * joints] = model.departures(person)
-    value[-1] = np.log(person.scale / _STATURE)
-    matrix[np.diag_indices_from(matrix)] += stiffness + 1e-6
-    gradient += stiffness * value
-    free = np.arange(len(gradient)) >= (0 if shapes else count)
-    step = np.zeros(len(gradient))
-    step[free] = np.linalg.solve(matrix[np.ix_(free, free)], -gradient[free])
-    step *= min(1.0, _MOST_BEND / max(float(np.abs(step[count : count + 3 * joints]).max()), 1e-9))
+    gradient[-1] += stiffness[-1] * np.log(person.scale / _STATURE)
+    step = step_within(model, person, matrix, gradient, stiffness, shapes=shapes, most_bend=_MOST_BEND)
     step *= min(1.0, _MOST_MOVE / max(float(np.abs(step[-4:-1]).max()), 1e-9))
     mean = float(np.sqrt((weight * residual**2).sum() / max(weight.sum(), 1e-9)))
     return model.moved(person, step), mean + 0.05 * float(1.0 - np.minimum(weight, 1.0).mean())

@@ -25,10 +25,14 @@ class SeamRun:
 
     Attributes:
         edges: names of the two edges.
+        spans: the first and the last point of the stretch along each of them.
+        against: whether the second edge runs against the first one.
         vertices: vertex indices of the two pieces along the stretch, in corresponding order.
     """
 
     edges: tuple[str, str]
+    spans: tuple[tuple[int, int], tuple[int, int]]
+    against: bool
     vertices: tuple[IntArray, IntArray]
 
 
@@ -127,12 +131,18 @@ def _runs(pieces: Mapping[str, FormPiece]) -> list[tuple[tuple[str, str], SeamRu
 
 
 def _run(pieces: Mapping[str, FormPiece], row: Sequence[tuple[_Place, _Place]]) -> tuple[tuple[str, str], SeamRun]:
-    (name, edge, _), (other_name, other_edge, _) = row[0]
-    sides = []
-    for piece, side in ((name, 0), (other_name, 1)):
+    names, edges, spans, sides = list[str](), list[str](), list[tuple[int, int]](), list[IntArray]()
+    for side in (0, 1):
         at = [places[side][2] for places in row]
-        sides.append(pieces[piece].edges[row[0][side][1]][min(at) : max(at) + 2])
-    first, second = sides
-    if pieces[name].grid_vertices[first[0]] != pieces[other_name].grid_vertices[second[0]]:
-        second = second[::-1]
-    return (name, other_name), SeamRun(edges=(edge, other_edge), vertices=(first, second))
+        names.append(row[0][side][0])
+        edges.append(row[0][side][1])
+        spans.append((min(at), max(at) + 1))
+        sides.append(pieces[names[-1]].edges[edges[-1]][spans[-1][0] : spans[-1][1] + 1])
+    first, second = (int(pieces[name].grid_vertices[ids[0]]) for name, ids in zip(names, sides, strict=True))
+    against = first != second
+    return (names[0], names[1]), SeamRun(
+        edges=(edges[0], edges[1]),
+        spans=(spans[0], spans[1]),
+        against=against,
+        vertices=(sides[0], sides[1][::-1] if against else sides[1]),
+    )

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core import InputError, IntArray, short_repr
+from warpflat.flat import half_edges
 
 __all__ = ["ARM_LEVELS", "LEG_LEVELS", "LEG_LINES", "QUARTERS", "RING_LEVELS", "Layout", "make_layout"]
 
@@ -150,6 +151,15 @@ class Layout(Strips):
     def faces_of(self, bricks: Collection[str]) -> NDArray[np.int64]:
         """Return the indices of the faces of some bricks."""
         return np.flatnonzero(np.isin(self.face_brick, [i for i, name in enumerate(self.bricks) if name in bricks]))
+
+    def edges_along(self, *lines: str) -> set[tuple[int, int]]:
+        """Return the mesh edges along some lines, the lower vertex first."""
+        return {(min(ends), max(ends)) for line in lines for ends in itertools.pairwise(self.lines[line].tolist())}
+
+    def edges_of(self, bricks: Collection[str], *, inside: bool = False) -> set[tuple[int, int]]:
+        """Return the mesh edges of some bricks, the lower vertex first; those between two of their faces alone, if asked for."""
+        sides = half_edges(self.faces[self.faces_of(bricks)])
+        return set(map(tuple, sides.edges[sides.count == 2 if inside else slice(None)].tolist()))
 
     @property
     def body_lines(self) -> dict[str, IntArray]:

@@ -117,18 +117,11 @@ class Mannequin:
         Raises:
             InputError: if the mesh is not a standing body with arms and legs that can be told apart.
         """
-        from warpflat.garment.mannequin.scan import average_sides, blueprint_from_scan, sides_note
+        from warpflat.garment.mannequin.scan import attributes_on_scan
         from warpflat.garment.mannequin.scan_pose import ScanOptions
 
-        layout = make_layout(resolution_mm)
-        options = options or ScanOptions()
-        found = blueprint_from_scan(np.asarray(vertices, float), np.asarray(faces), options)
-        scanned = build_vertices(layout, found.blueprint)
-        return cls(
-            layout=layout, vertices=average_sides(scanned, layout) if options.symmetric else scanned,
-            source=found.source, notes=(*found.notes, *sides_note(scanned, layout, averaged=options.symmetric)),
-            sections=found.sections, measures=found.measures, scan=found.scan, placed=found.placed,
-        )  # fmt: skip
+        points, options = np.asarray(vertices, float), options or ScanOptions()
+        return Mannequin(**attributes_on_scan(points, np.asarray(faces), options, make_layout(resolution_mm)))
 
     @classmethod
     def _from(cls, measurements: Measurements, resolution_mm: float) -> Mannequin:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpflat.core import (
     BoolArray,
@@ -17,16 +18,15 @@ from warpflat.core import (
     arc_lengths,
     nearest_on_polyline,
     points_at_lengths,
+    unit,
 )
-from warpflat.flat import vertex_normals
-from warpflat.garment.mannequin.closest import Closest
+from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.layout import Layout
-from warpflat.garment.mannequin.sheet import sheet_laplacian
+from warpflat.garment.mannequin.sheet import fill_sheet, sheet_laplacian
+from warpflat.garment.mannequin.slicer import Slicer
 
 __all__ = ["Neckline", "widen_neck"]
 
-# Upright sections of chest and back begin so far [m] above the lowest point across chest or back.
-_ABOVE = 0.015
 # The neckline behind goes off the base of the neck in steps of so much [m].
 _STEP = 0.004
 # How much more upright edges weigh than those across, as the rows below a neckline follow it; the first that folds nothing is taken.
@@ -69,6 +69,11 @@ class Neckline:
             "front_share": (0.0, 0.8), "back_share": (0.0, 0.8), "front_power": (1.0, 8.0),
         }  # fmt: skip
 
+    @property
+    def is_round(self) -> bool:
+        """Whether it is neither a V nor a square."""
+        return self.front_power == Neckline.front_power
+
     def in_cm(self, layout: Layout, vertices: FloatArray) -> Neckline:
         """Return the same neckline without shares.
 
@@ -103,83 +108,36 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
     ids, laplacian, local = sheet_laplacian(layout, layout.level_row["bust"])
     quads = layout.faces[np.isin(layout.faces, ids).all(axis=1)]
     surface = _Surface(vertices, quads)
-    out = vertices.copy()
     neckline = neckline.in_cm(layout, vertices)
-    neck, seams, centres = layout.neck[0], [], []
-    for side in ("left", "right"):
-        seam = layout.yokes[f"front-{side}"][-1]
-        seams.append(seam if seam[0] in neck else seam[::-1])
-        # The seam begins later; its outer end stays.
-        points, start = vertices[seams[-1]], 0.01 * neckline.side_cm
-        at = arc_lengths(points)
-        if start > at[-1] - 0.02:
-            raise InputError(f"neckline: side_cm is {100 * start:g}, but the shoulder is {100 * at[-1]:.1f} cm long")
-        out[seams[-1]] = points_at_lengths(points, start + (at[-1] - start) * at / at[-1])
-    for face, row, column, depth in (
-        ("front", layout.front, 0, neckline.front_cm),
-        ("back", layout.back, layout.rings.shape[1] // 2, neckline.back_cm),
-    ):
-        patches = [row, *(layout.yokes[f"{face}-{side}"] for side in ("left", "right"))]
-        half = _Surface(vertices, quads[np.isin(quads, np.concatenate([p.ravel() for p in patches])).all(axis=1)])
-        middle = row.shape[1] // 2
-        centres.append(np.concatenate([row[:0:-1, middle], layout.rings[::-1, column]]))
-        out[row[-1, middle]] = points_at_lengths(vertices[centres[-1]], [0.01 * depth])[0]
-        for seam in seams:
-            # The shorter part of the neck's closed row between the centre line and the seam.
-            first, last = (int(np.flatnonzero(neck == vertex)[0]) for vertex in (row[-1, middle], seam[0]))
-            parts = (np.arange((last - first) % len(neck) + 1), -np.arange((first - last) % len(neck) + 1))
-            quarter = np.asarray(neck[(first + min(parts, key=len)) % len(neck)])
-            share = arc_lengths(vertices[quarter]) / arc_lengths(vertices[quarter])[-1]
-            # There they become a quarter of the superellipse of that power.
-            centre, shoulder = out[quarter[0]], out[quarter[-1]]
-            if face == "back":
-                out[quarter] = half.beside(vertices[quarter], 0.01 * depth, 0.01 * neckline.side_cm, (centre, shoulder))
-                continue
-            power = neckline.front_power
-            level = float(half.vertices[:, 1].min()) + _ABOVE
-            turn = 0.5 * np.pi * share[1:-1]
-            if power != Neckline.front_power:
-                # A V and a square are not turned through evenly as they are walked along.
-                fine = np.linspace(0.0, 0.5 * np.pi, 513)
-                wide, high = abs(shoulder[0] - centre[0]), abs(shoulder[1] - centre[1])
-                walked = arc_lengths(
-                    np.column_stack([wide * np.sin(fine) ** (2.0 / power), -high * np.cos(fine) ** (2.0 / power)])
-                )
-                turn = np.interp(share[1:-1] * walked[-1], walked, fine)
-            across, up = np.sin(turn) ** (2.0 / power), 1.0 - np.cos(turn) ** (2.0 / power)
-            # Just beside the seams, so that the sections do not run along edges of the mesh.
-            sides = centre[0] + (shoulder[0] - centre[0]) * np.clip([0.0, *across, 1.0], 0.01, 0.99)
-            sections = [half.upright(float(x), level) for x in sides]
-            lengths = [arc_lengths(section) for section in sections]
-            low, high = (
-                float(np.interp(end[1], section[:, 1], length))
-                for end, section, length in ((centre, sections[0], lengths[0]), (shoulder, sections[-1], lengths[-1]))
-            )
-            wished = zip(sections[1:-1], low + (high - low) * up, strict=True)
-            on_sections = np.array([points_at_lengths(section, [length])[0] for section, length in wished])
-            out[quarter[1:-1]] = half.nearest(on_sections)
-    fixed = np.unique(
-        np.concatenate(
-            [neck, *seams, layout.rings[layout.level_row["bust"]], *(arm[0] for arm in layout.arms.values())]
-        )
-    )
-    moved = np.setdiff1d(ids, fixed)
-    # Smooth as far as that keeps every quad upright; below a deep neckline each column of the grid is drawn together by itself instead.
-    upright, best, fewest = _corners_upright(vertices, quads), out, quads.size + 1
-    few = (_FOLDED if neckline.front_power == Neckline.front_power else 0.0) * quads.size
+    seams = [layout.yokes[f"front-{side}"][-1] for side in ("left", "right")]
+    seams = [seam if seam[0] in layout.neck[0] else seam[::-1] for seam in seams]
+    # From the neck down to the ankle.
+    around = layout.rings.shape[1] // 2
+    centres = {
+        face: np.concatenate([patch[:0:-1, patch.shape[1] // 2], layout.rings[::-1, column]])
+        for face, patch, column in (("front", layout.front, 0), ("back", layout.back, around))
+    }
+    out = _with_neckline(layout, vertices, neckline, quads, seams, centres)
+    fixed = [layout.neck[0], *seams, layout.rings[layout.level_row["bust"]], *(arm[0] for arm in layout.arms.values())]
+    moved = np.setdiff1d(ids, np.concatenate(fixed))
+    upright, few = _corners_upright(vertices, quads), (_FOLDED if neckline.is_round else 0.0) * quads.size
 
-    def on_centres(placed: FloatArray) -> None:
-        """What lies on a centre line stays on it."""
-        for line in centres:
+    def laid(wished: FloatArray) -> tuple[FloatArray, int]:
+        """Return the vertices with those that follow laid on the surface near to where they are wished, and how many corners are folded."""
+        placed = out.copy()
+        placed[moved] = surface.nearest(wished[moved])
+        # What lies on a centre line stays on it.
+        for line in centres.values():
             for vertex in np.intersect1d(line, moved):
                 placed[vertex] = nearest_on_polyline(placed[vertex], vertices[line])
+        return placed, int((upright & ~_corners_upright(placed, quads, along=vertices)).sum())
 
+    # Smooth as far as that keeps every quad upright; below a deep neckline each column of the grid is drawn together by itself instead.
+    best, fewest = out, quads.size + 1
     for stiffness in _ALONG_COLUMNS:
-        placed = out.copy()
-        shift = _filled(out - vertices, ids, _along_columns(laplacian, vertices[ids], stiffness), local, fixed)
-        placed[moved] = surface.nearest(vertices[moved] + shift[moved])
-        on_centres(placed)
-        folded = int((upright & ~_corners_upright(placed, quads, along=vertices)).sum())
+        shift = out - vertices
+        fill_sheet(shift, layout, ids, _along_columns(laplacian, vertices[ids], stiffness)[local[moved]], local[moved])
+        placed, folded = laid(vertices + shift)
         if folded < fewest:
             best, fewest = placed, folded
         if folded <= few:
@@ -188,18 +146,64 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
     for _ in range(_TURNS_BACK):
         if fewest <= few:
             break
-        turned_back = best.copy()
-        turned_back[moved] = surface.nearest(_unfolded(best, quads, moved, vertices)[moved])
-        on_centres(turned_back)
-        folded = int((upright & ~_corners_upright(turned_back, quads, along=vertices)).sum())
+        placed, folded = laid(_unfolded(best, quads, moved, vertices))
         if folded >= fewest:
             break
-        best, fewest = turned_back, folded
+        best, fewest = placed, folded
     # A round one that is not deep, as forms ask for by themselves, is drawn as well as it can be on anybody.
-    is_deep = max(neckline.front_cm, neckline.back_cm) > _DEEP or neckline.front_power != Neckline.front_power
+    is_deep = max(neckline.front_cm, neckline.back_cm) > _DEEP or not neckline.is_round
     if fewest > few and is_deep:
         raise InputError("neckline: the cloth folds below it; make it less deep: a smaller front_cm or back_cm")
     return best
+
+
+def _with_neckline(
+    layout: Layout,
+    vertices: FloatArray,
+    neckline: Neckline,
+    quads: IntArray,
+    seams: Sequence[IntArray],
+    centres: Mapping[str, IntArray],
+) -> FloatArray:
+    """Return a form's vertices with neck's row and shoulder seams where the neckline has them, all others as they are.
+
+    Args:
+        layout, vertices: of the form, #V by 3 [m].
+        neckline: without shares.
+        quads: of chest, back and shoulders.
+        seams: at the shoulders, from the neck.
+        centres: the centre lines in front and behind, from the neck down.
+
+    Raises:
+        InputError: the neckline takes a whole shoulder seam.
+    """
+    out, neck, side = vertices.copy(), layout.neck[0], 0.01 * neckline.side_cm
+    for seam in seams:
+        # The seam begins later; its outer end stays.
+        at = arc_lengths(vertices[seam])
+        if side > at[-1] - 0.02:
+            raise InputError(f"neckline: side_cm is {100 * side:g}, but the shoulder is {100 * at[-1]:.1f} cm long")
+        out[seam] = points_at_lengths(vertices[seam], side + (at[-1] - side) * at / at[-1])
+    for face, patch, depth in (
+        ("front", layout.front, 0.01 * neckline.front_cm),
+        ("back", layout.back, 0.01 * neckline.back_cm),
+    ):
+        patches = [patch, *(layout.yokes[f"{face}-{each}"] for each in ("left", "right"))]
+        half = _Surface(vertices, quads[np.isin(quads, np.concatenate([p.ravel() for p in patches])).all(axis=1)])
+        top = centres[face][0]
+        out[top] = points_at_lengths(vertices[centres[face]], [depth])[0]
+        for seam in seams:
+            # The shorter part of the neck's closed row between the centre line and the seam.
+            first, last = (int(np.flatnonzero(neck == vertex)[0]) for vertex in (top, seam[0]))
+            parts = (np.arange((last - first) % len(neck) + 1), -np.arange((first - last) % len(neck) + 1))
+            quarter = np.asarray(neck[(first + min(parts, key=len)) % len(neck)])
+            ends = out[quarter[0]], out[quarter[-1]]
+            if face == "back":
+                out[quarter] = half.beside(vertices[quarter], depth, side, ends)
+            else:
+                share = arc_lengths(vertices[quarter]) / arc_lengths(vertices[quarter])[-1]
+                out[quarter[1:-1]] = half.superellipse(share[1:-1], neckline.front_power, ends)
+    return out
 
 
 def _along_columns(laplacian: Any, points: FloatArray, stiffness: float) -> Any:
@@ -257,21 +261,23 @@ def _unfolded(points: FloatArray, quads: IntArray, moved: IntArray, along: Float
     return out
 
 
-class _Surface:
+class _Surface(Mesh):
     """A quad mesh that points are brought back to; four triangles around the middle of each quad keep mirror images alike."""
 
     def __init__(self, vertices: FloatArray, quads: IntArray) -> None:
-        middles, self.quads = len(vertices) + np.arange(len(quads)), quads
-        self.vertices = np.vstack([vertices, vertices[quads].mean(axis=1)])
-        self.triangles = np.concatenate(
-            [np.column_stack([quads[:, [k, (k + 1) % 4]], middles]) for k in range(4)]
-        ).astype(np.int64)
-        self.closest = Closest(self.vertices, self.triangles)
+        middles = len(vertices) + np.arange(len(quads))
+        triangles = [np.column_stack([quads[:, [k, (k + 1) % 4]], middles]) for k in range(4)]
+        super().__init__(
+            np.vstack([vertices, vertices[quads].mean(axis=1)]), np.concatenate(triangles).astype(np.int64)
+        )
+
+    @cached_property
+    def _slicer(self) -> Slicer:
+        return Slicer(self.vertices, self.triangles)
 
     def nearest(self, points: FloatArray) -> FloatArray:
         """Return the nearest points of the surface (#P by 3 [m])."""
-        triangle, weights, _ = self.closest(points)
-        return np.asarray((self.vertices[self.triangles[triangle]] * weights[:, :, None]).sum(axis=1))
+        return self.closest(points)[2]
 
     def beside(self, line: FloatArray, first: float, last: float, ends: tuple[FloatArray, FloatArray]) -> FloatArray:
         """Return a line on the surface beside another one (#P by 3 [m]): square to it, so far [m] from its first and its last point.
@@ -285,14 +291,9 @@ class _Surface:
         share = arc_lengths(line) / arc_lengths(line)[-1]
         step = (first + (last - first) * np.sin(0.5 * np.pi * share) ** 2) / count
         inner = self.vertices[self.triangles].mean(axis=(0, 1))
-        normals = vertex_normals(self.vertices[: -len(self.quads)], self.quads)
-        normals = np.vstack([normals, normals[self.quads].mean(axis=1)])
         out = line
         for _ in range(count):
-            triangle, weights, _ = self.closest(out)
-            normal = (normals[self.triangles[triangle]] * weights[:, :, None]).sum(axis=1)
-            square = np.cross(normal, np.gradient(out, axis=0))
-            square /= np.linalg.norm(square, axis=1, keepdims=True)
+            square = unit(np.cross(self.normals_at(*self.closest(out)[:2]), np.gradient(out, axis=0)))
             square *= np.sign((square * (inner - out)).sum())
             out = self.nearest(out + step[:, None] * square)
         share = (arc_lengths(out) / arc_lengths(out)[-1])[:, None]
@@ -300,31 +301,36 @@ class _Surface:
         out[[0, -1]] = ends
         return out
 
-    def upright(self, x: float, level: float) -> FloatArray:
-        """Return the section at `x` from the height `level` [m] up, #P by 3 from low to high."""
-        corner = self.vertices[self.triangles]
-        off = corner[:, :, 0] - x
-        ends = []
-        for i, j in ((0, 1), (1, 2), (2, 0)):
-            crossed = off[:, i] * off[:, j] < 0.0
-            share = (off[crossed, i] / (off[crossed, i] - off[crossed, j]))[:, None]
-            ends.append((1.0 - share) * corner[crossed, i] + share * corner[crossed, j])
-        line = np.concatenate(ends)
-        line = line[np.argsort(line[:, 1])]
-        return line[line[:, 1] > level]
+    def superellipse(self, share: FloatArray, power: float, ends: tuple[FloatArray, FloatArray]) -> FloatArray:
+        """Return points of a quarter of a superellipse between two ends, drawn where the surface unrolls (#P by 3 [m]).
 
+        Args:
+            share: #P, of its length.
+            power: of the superellipse.
+            ends: in the centre and at the shoulder [m].
+        """
+        centre, shoulder = ends
+        turn = 0.5 * np.pi * share
+        if power != Neckline.front_power:
+            # A V and a square are not turned through evenly as they are walked along.
+            fine = np.linspace(0.0, 0.5 * np.pi, 513)
+            wide, high = np.abs(shoulder - centre)[:2]
+            walked = arc_lengths(
+                np.column_stack([wide * np.sin(fine) ** (2.0 / power), -high * np.cos(fine) ** (2.0 / power)])
+            )
+            turn = np.interp(share * walked[-1], walked, fine)
+        across, up = np.sin(turn) ** (2.0 / power), 1.0 - np.cos(turn) ** (2.0 / power)
+        # Just beside the seams, so that the sections do not run along edges of the mesh.
+        sides = centre[0] + (shoulder[0] - centre[0]) * np.clip([0.0, *across, 1.0], 0.01, 0.99)
+        sections = [self.upright(float(x)) for x in sides]
+        low, high = (
+            float(np.interp(end[1], section[:, 1], arc_lengths(section)))
+            for end, section in ((centre, sections[0]), (shoulder, sections[-1]))
+        )
+        wished = zip(sections[1:-1], low + (high - low) * up, strict=True)
+        return self.nearest(np.array([points_at_lengths(section, [length])[0] for section, length in wished]))
 
-def _filled(
-    shift: FloatArray, ids: IntArray, laplacian: object, local: NDArray[np.int64], known: IntArray
-) -> FloatArray:
-    """Return the shift of a whole sheet, harmonic between the vertices whose shift is known."""
-    from scipy.sparse.linalg import spsolve
-
-    fixed = np.zeros(len(ids), dtype=bool)
-    fixed[local[known]] = True
-    operator = laplacian.tocsr()  # type: ignore[attr-defined]
-    free = np.flatnonzero(~fixed)
-    right = -(operator[free][:, fixed] @ shift[ids[fixed]])
-    out = shift.copy()
-    out[ids[free]] = spsolve(operator[free][:, free].tocsc(), right)
-    return out
+    def upright(self, x: float) -> FloatArray:
+        """Return the section at `x` [m], #P by 3 from low to high."""
+        line = self._slicer.points(np.array([1.0, 0.0, 0.0]), x)
+        return line[np.argsort(line[:, 1])]

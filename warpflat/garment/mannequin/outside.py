@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpflat.core import FloatArray, IntArray
+from warpflat.core import FloatArray, IntArray, unit
 from warpflat.flat import vertex_normals
-from warpflat.garment.mannequin.closest import Closest
+from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.layout import Layout
 
 __all__ = ["BodySurface", "push_outside"]
@@ -38,7 +38,7 @@ class BodySurface:
         self.vertices, self.normals = vertices, vertex_normals(vertices, layout.body_faces)
         self.used = np.unique(faces)
         self.tree = cKDTree(vertices[self.used])
-        self.splits = [(triangles, Closest(vertices, triangles)) for triangles in splits]
+        self.splits = [Mesh(vertices, triangles) for triangles in splits]
         self.near = 0.5 * layout.resolution
 
     def vectors_out(self, points: FloatArray) -> FloatArray:
@@ -48,11 +48,10 @@ class BodySurface:
         vertex = self.used[self.tree.query(points)[1]]
         rise = np.einsum("nk,nk->n", points - self.vertices[vertex], self.normals[vertex])
         near = np.flatnonzero(rise < self.near)
-        for triangles, closest in self.splits if len(near) else ():
-            triangle, weights, _ = closest(points[near])
-            corners = triangles[triangle]
-            vector = np.einsum("nk,nkd->nd", weights, self.vertices[corners]) - points[near]
-            outward = np.einsum("nk,nkd->nd", weights, self.normals[corners])
+        for split in self.splits if len(near) else ():
+            triangle, weights, place = split.closest(points[near])
+            vector = place - points[near]
+            outward = np.einsum("nk,nkd->nd", weights, self.normals[split.triangles[triangle]])
             vector[np.einsum("nk,nk->n", vector, outward) <= 0.0] = 0.0
             longer = np.linalg.norm(vector, axis=1) > np.linalg.norm(vectors[near], axis=1)
             vectors[near[longer]] = vector[longer]
@@ -97,5 +96,5 @@ def push_outside(vertices: FloatArray, layout: Layout, body: FloatArray, used: I
             share = pushed * (1.0 - away * away) ** 2 * alike
             amount[near] = np.maximum(amount[near], share)
             direction[near] += share[:, None] * vector
-        out[used] += amount[:, None] * direction / np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-300)
+        out[used] += amount[:, None] * unit(direction)
     return out

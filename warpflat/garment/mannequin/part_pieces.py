@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, IntArray, nearest
+from warpflat.core import FloatArray, InputError, IntArray, nearest, other_side
 from warpflat.flat import join_labels
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.darts import FormDart, place_darts
@@ -38,7 +38,7 @@ def part_pieces(layout: Layout, vertices: FloatArray, form: Form, seams: Sequenc
             raise InputError(f"seam {seam.name!r}: no piece {seam.piece!r}; {nearest(seam.piece, form.pieces)}")
         if seam.line not in layout.lines:
             raise InputError(f"seam {seam.name!r}: line {seam.line!r} is unknown: {nearest(seam.line, layout.lines)}")
-        images = (seam.line, _mirror_line(seam.line)) if seam.mirrored else (seam.line,)
+        images = (seam.line, other_side(seam.line)) if seam.mirrored else (seam.line,)
         lines.setdefault(seam.piece, []).extend(images)
     pieces: dict[str, PieceRecipe] = {}
     parts_of: dict[str, dict[str, PieceRecipe]] = {}
@@ -85,16 +85,8 @@ def princess_seams(layout: Layout, bricks: Sequence[str], piece: str) -> list[Fo
     return [
         FormDart(name="princess seam", piece=piece, line=line, part=(0.0, 1.0))
         for line in lines
-        if len(set(_labels(layout, bricks, [line, _mirror_line(line)]).tolist())) > 1
+        if len(set(_labels(layout, bricks, [line, other_side(line)]).tolist())) > 1
     ]
-
-
-def _mirror_line(line: str) -> str:
-    """Return the name of a line's mirror image."""
-    for side, other in (("left", "right"), ("right", "left")):
-        if line.endswith(f" {side}"):
-            return f"{line.removesuffix(side)}{other}"
-    return line
 
 
 def _parts(
@@ -127,30 +119,17 @@ def _parts(
         place = "" if len(alike) == 1 else ("lower", "upper")[at] if len(alike) == 2 else f"{at + 1}"
         names.append("_".join(part for part in (word, place) if part))
     for part, ending in zip(groups, names, strict=True):
-        bounds = _edges_of(layout, part)
-        through = [line for line in (recipe.datum, *lines) if line and _edges_along(layout, line) & bounds]
-        inner = [line for line in recipe.open if _edges_along(layout, line) & bounds]
+        bounds = layout.edges_of(part)
+        through = [line for line in (recipe.datum, *lines) if line and layout.edges_along(line) & bounds]
+        inner = [line for line in recipe.open if layout.edges_along(line) & bounds]
         found[f"{name}_{ending}"] = PieceRecipe(bricks=tuple(part), datum=(through or [""])[0], open=tuple(inner))
     return found
 
 
 def _labels(layout: Layout, bricks: Sequence[str], lines: Sequence[str]) -> IntArray:
     """Return for each brick the number of the part to which it belongs: neighbours are one part unless a line lies between."""
-    slits = set().union(*(_edges_along(layout, line) for line in lines))
-    edges = [_edges_of(layout, [brick]) - slits for brick in bricks]
+    slits = layout.edges_along(*lines)
+    edges = [layout.edges_of([brick]) - slits for brick in bricks]
     links = [(i, k) for i in range(len(bricks)) for k in range(i) if edges[i] & edges[k]]
     first, second = np.array(links, dtype=np.int32).reshape(-1, 2).T
     return join_labels(len(bricks), first, second)
-
-
-def _edges_of(layout: Layout, bricks: Sequence[str]) -> set[tuple[int, int]]:
-    """Return the mesh edges of bricks."""
-    index = {brick: number for number, brick in enumerate(layout.bricks)}
-    corners = layout.faces[np.isin(layout.face_brick, [index[brick] for brick in bricks])]
-    ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2), axis=1)
-    return {(a, b) for a, b in ends.tolist()}
-
-
-def _edges_along(layout: Layout, line: str) -> set[tuple[int, int]]:
-    ids = layout.lines[line]
-    return {(min(a, b), max(a, b)) for a, b in zip(ids[:-1].tolist(), ids[1:].tolist(), strict=True)}

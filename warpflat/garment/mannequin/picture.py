@@ -10,7 +10,7 @@ import numpy as np
 
 from warpflat.core import FloatArray
 from warpflat.flat import vertex_normals
-from warpflat.garment.mannequin.closest import Closest
+from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.layout import LEG_LINES, RING_LEVELS
 from warpflat.pattern import (
     INK,
@@ -137,13 +137,10 @@ def signed_distances(mannequin: Mannequin) -> FloatArray:
     assert mannequin.scan is not None
     points, triangles = mannequin.scan
     middles = mannequin.vertices[mannequin.layout.body_faces].mean(axis=1)
-    triangle, weights, distance = Closest(points, triangles)(middles)
-    corners = points[triangles]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    # A mesh whose faces turn inwards has a negative volume.
-    turn = np.sign(np.einsum("td,td->", normals, corners.mean(axis=1) - points.mean(axis=0)))
-    place = np.einsum("nk,nkd->nd", weights, corners[triangle])
-    return np.asarray(distance * np.sign(turn * np.einsum("nd,nd->n", middles - place, normals[triangle])))
+    surface = Mesh(points, triangles)
+    triangle, weights, place = surface.closest(middles)
+    off = np.einsum("nd,nd->n", middles - place, surface.normals_at(triangle, weights))
+    return np.asarray(np.linalg.norm(middles - place, axis=1) * np.sign(off))
 
 
 def write_distance_picture(mannequin: Mannequin, path: str | os.PathLike[str]) -> None:

@@ -6,13 +6,12 @@ import itertools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core import FloatArray, InputError, IntArray, find_unused_name, nearest, short_repr
-from warpflat.flat import Surface, join_labels
+from warpflat.flat import Surface, border_edges, euler_characteristic, half_edges, join_labels
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.halves import check_halves, fold_among, is_side, lies_on_both
 from warpflat.garment.mannequin.layout import Layout
@@ -121,11 +120,8 @@ def _check_opened(layout: Layout, name: str, bricks: Sequence[str], opened: Sequ
     """See that a piece lies on both sides of the lines along which it is to be open."""
     if not opened:
         return
-    corners = layout.faces[layout.faces_of(bricks)]
-    ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2), axis=1)
-    edges, counts = np.unique(ends, axis=0, return_counts=True)
-    inside = {(a, b) for a, b in edges[counts == 2].tolist()}
-    through = [line for line in layout.lines if not inside.isdisjoint(_edge_set(layout, [line]))]
+    inside = layout.edges_of(bricks, inside=True)
+    through = [line for line in layout.lines if not inside.isdisjoint(layout.edges_along(line))]
     for line in opened:
         if line not in through:
             raise InputError(
@@ -151,7 +147,7 @@ def _piece(
     inside = set(np.unique(layout.faces[rows]).tolist())
     darts = {dart: row for dart, row in darts.items() if inside.issuperset(row.tolist())}
     slits = {(min(a, b), max(a, b)) for row in darts.values() for a, b in itertools.pairwise(row.tolist())}
-    corners, grid_vertices = _split(layout.faces[rows], _edge_set(layout, opened) | slits)
+    corners, grid_vertices = _split(layout.faces[rows], layout.edges_along(*opened) | slits)
     loop, holes = _borders(corners, name, opened=bool(opened), darts=darts)
     # A fish-eye dart is a hole; its legs run from its first tip to its second.
     fisheyes = {}
@@ -190,34 +186,20 @@ def _piece(
     )  # fmt: skip
 
 
-def _edge_set(layout: Layout, lines: Sequence[str]) -> set[tuple[int, int]]:
-    edges: set[tuple[int, int]] = set()
-    for line in lines:
-        for a, b in itertools.pairwise(layout.lines[line].tolist()):
-            edges.add((min(a, b), max(a, b)))
-    return edges
-
-
 def _split(faces: IntArray, cut: set[tuple[int, int]]) -> tuple[IntArray, IntArray]:
     """Return faces renumbered to the piece's own vertices, which are doubled along the edges in `cut`.
 
     Two corners at one vertex are one vertex of the piece if a chain of faces joins them without crossing the cut.
     """
-    flat, count = faces.reshape(-1), faces.size
-    begin = np.arange(count)
-    end = begin - begin % 4 + (begin + 1) % 4
+    flat, count, he = faces.reshape(-1), faces.size, half_edges(faces)
     # Sides of faces in the order of their edges, so that the two sides of one lie side by side.
-    edge = _edge_codes(np.column_stack([flat[begin], flat[end]]))
-    order = np.argsort(edge, kind="stable")
-    _, place, sides = np.unique(edge[order], return_index=True, return_counts=True)
-    one = order[place[sides == 2]]
-    other = order[place[sides == 2] + 1]
-    closed = ~np.isin(edge[one], _edge_codes(np.array(sorted(cut), dtype=np.int64).reshape(-1, 2)))
-    one, other = one[closed], other[closed]
-    crossed = flat[one] == flat[end[other]]
+    order, place = np.argsort(he.edge, kind="stable"), np.cumsum(he.count) - he.count
+    closed = (he.count == 2) & [(a, b) not in cut for a, b in he.edges.tolist()]
+    one, other = order[place[closed]], order[place[closed] + 1]
+    crossed = he.tail[one] == he.head[other]
     links = np.concatenate([
-        np.column_stack([one, np.where(crossed, end[other], other)]),
-        np.column_stack([end[one], np.where(crossed, other, end[other])]),
+        np.column_stack([one, np.where(crossed, he.next[other], other)]),
+        np.column_stack([he.next[one], np.where(crossed, other, he.next[other])]),
     ])  # fmt: skip
     label = join_labels(count, links[:, 0], links[:, 1])
     # Numbered in the mannequin's order, so that a piece is the same in every size.
@@ -231,12 +213,6 @@ def _split(faces: IntArray, cut: set[tuple[int, int]]) -> tuple[IntArray, IntArr
     return corners.reshape(-1, 4), grid_vertices
 
 
-def _edge_codes(ends: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
-    """Return a number for each edge (#E by 2), whatever its direction."""
-    low, high = np.sort(ends.astype(np.int64), axis=1).T
-    return np.asarray((low << 32) | high)
-
-
 def _borders(
     corners: IntArray, name: str, *, opened: bool, darts: Collection[str]
 ) -> tuple[NDArray[np.int64], list[NDArray[np.int64]]]:
@@ -245,10 +221,8 @@ def _borders(
     Raises:
         InputError: the faces are no disk, with or without holes.
     """
-    ahead = np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2)
-    key = np.sort(ahead, axis=1)
-    edges, inverse, counts = np.unique(key, axis=0, return_inverse=True, return_counts=True)
-    border = ahead[counts[np.ravel(inverse)] == 1]
+    sides = half_edges(corners)
+    border = border_edges(corners)
     follow = dict(border.tolist())
     if len(follow) != len(border) or not follow:
         raise InputError(_not_one_disk(name, opened=opened, darts=darts))
@@ -260,7 +234,7 @@ def _borders(
             loops[-1].append(ahead_of)
     loops.sort(key=len, reverse=True)
     # By Euler: every further loop is a hole of the one disk.
-    if int(corners.max()) + 1 - len(edges) + len(corners) != 2 - len(loops):
+    if euler_characteristic(sides) != 2 - len(loops):
         raise InputError(_not_one_disk(name, opened=opened, darts=darts))
     return np.array(loops[0]), [np.array(loop) for loop in loops[1:]]
 
@@ -374,11 +348,10 @@ def _with_edges(run: list[int], edges: Mapping[str, list[int]]) -> tuple[list[in
 
 def _inner_runs(layout: Layout, corners: IntArray, grid_vertices: IntArray) -> dict[str, list[list[int]]]:
     """Return the runs of each feature line inside the piece, off the border, as vertex indices of the piece."""
-    ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2), axis=1)
-    mesh_edges, faces = np.unique(ends, axis=0, return_counts=True)
+    sides = half_edges(corners)
     # Off the border, and so off all that is doubled, an edge of the mannequin is one of the piece.
     inner: dict[tuple[int, int], int] = {}
-    for u, v in mesh_edges[faces == 2].tolist():
+    for u, v in sides.edges[sides.count == 2].tolist():
         a, b = int(grid_vertices[u]), int(grid_vertices[v])
         inner[a, b], inner[b, a] = v, u
     found: dict[str, list[list[int]]] = {}

@@ -9,7 +9,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, InputError, resample
 
-__all__ = ["Section", "convex_girth", "scale_to_girth", "section_curve", "superellipse_exponent"]  # fmt: skip
+__all__ = ["Section", "convex_girth", "scale_to_girth", "section_curve", "superellipse_exponent", "upper_hull"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,3 +110,19 @@ def scale_to_girth(points: FloatArray, girth: float) -> FloatArray:
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     factor = girth / convex_girth(points)
     return middle + (points - middle) * np.array([factor, 1.0, factor])
+
+
+def upper_hull(points: FloatArray) -> list[int]:
+    """Return which of plane points (#P by 2), in their order from left to right, lie on the upper side of their convex hull.
+
+    Source: Andrew's monotone chain.
+    """
+    touch: list[int] = []
+    for row, point in enumerate(points):
+        while len(touch) > 1:
+            (x0, y0), (x1, y1) = point - points[touch[-2]], points[touch[-1]] - points[touch[-2]]
+            if x1 * y0 < x0 * y1:
+                break
+            touch.pop()
+        touch.append(row)
+    return touch

@@ -1,12 +1,17 @@
-"""Rays from inside a convex hull."""
+"""Rays from inside the convex hulls of sections: curves that are smooth around a body and along it."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from warpflat.core import FloatArray, InputError
 
-__all__ = ["ray_radii"]
+__all__ = ["ray_radii", "row_at", "smooth_radii", "with_harmonics"]
+
+# Sampled hulls are smoothed so far from row to row [rows].
+_UP_SIGMA = 1.5
 
 
 def ray_radii(hull: FloatArray, middle: FloatArray, count: int, height: float) -> FloatArray:
@@ -32,3 +37,36 @@ def ray_radii(hull: FloatArray, middle: FloatArray, count: int, height: float) -
     top = a[:, 0] * along[:, 1] - a[:, 1] * along[:, 0]
     safe = np.abs(bottom) > 1e-12
     return np.where(safe, top / np.where(safe, bottom, 1.0), np.linalg.norm(a, axis=1))
+
+
+def with_harmonics(radii: FloatArray, harmonics: int) -> FloatArray:
+    """Return radii (... by #R) around closed curves with so many of their lowest harmonics, the mean among them."""
+    spectrum = np.fft.rfft(radii)
+    spectrum[..., harmonics:] = 0.0
+    return np.fft.irfft(spectrum, radii.shape[-1])
+
+
+def smooth_radii(
+    hulls: Sequence[FloatArray], middles: FloatArray, heights: FloatArray, count: int, harmonics: int
+) -> FloatArray:
+    """Return #S by `count`, the radii of sections' hulls from their middles [m], smooth around and from section to section.
+
+    Args:
+        hulls: #S, each #P by 2 (x, z) [m].
+        middles: #S by 2 [m].
+        heights: #S [m].
+        count: of rays.
+        harmonics: that are kept.
+    """
+    from scipy.ndimage import gaussian_filter1d
+
+    rows = zip(hulls, middles, heights.tolist(), strict=True)
+    radii = np.stack([ray_radii(hull, middle, count, height) for hull, middle, height in rows])
+    return with_harmonics(gaussian_filter1d(radii, _UP_SIGMA, axis=0, mode="nearest"), harmonics)
+
+
+def row_at(values: FloatArray, heights: FloatArray, height: float) -> FloatArray:
+    """Return what rows of values (#S by ...) at rising heights (#S [m]) are at a height between them."""
+    at = float(np.clip(np.interp(height, heights, np.arange(len(heights))), 0.0, len(heights) - 1.001))
+    i, f = int(at), at - int(at)
+    return np.asarray((1.0 - f) * values[i] + f * values[i + 1])

@@ -15,7 +15,7 @@ from warpflat.garment.mannequin.body_landmarks import LEVELS
 from warpflat.garment.mannequin.scan_levels import ScanLevel, find_levels
 from warpflat.garment.mannequin.scan_pose import LEVELS_UP, ScanOptions, turn_scan_upright
 from warpflat.garment.mannequin.scan_sections import BodySections
-from warpflat.garment.mannequin.slicer import Slicer
+from warpflat.garment.mannequin.slicer import UP, Slicer
 from warpflat.garment.mannequin.stand_body import StandingBody, stand_body
 
 __all__ = ["ReadBody", "read_body", "whole_sections"]
@@ -78,7 +78,6 @@ def read_body(vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptio
     laid = stand_body(
         scan.vertices,
         scan.triangles,
-        scan.scanned,
         faces_ahead=options.facing is not None,
         as_scanned=options.keep_pose and not scan.sits,
         sits=scan.sits,
@@ -91,17 +90,17 @@ def read_body(vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptio
         )
     posed, sits = laid.posed, scan.sits
     if laid.turned:
-        scan = Slicer(scan.vertices * [-1.0, 1.0, -1.0], scan.triangles, scan.noise, scan.scanned)
+        scan = Slicer(scan.vertices * [-1.0, 1.0, -1.0], scan.triangles, scan.noise)
         turn, shift = turn * [-1.0, 1.0, -1.0], shift * [-1.0, 1.0, -1.0]
         notes.append("the scan was found to face the other way by the body model")
     if sits:
         # What a tape would measure on the person standing.
-        scan = Slicer(laid.stood(scan.vertices), scan.triangles, scan.noise, scan.scanned)
+        scan = Slicer(laid.stood(scan.vertices), scan.triangles, scan.noise)
         scan.sits, laid = True, replace(laid, posed=laid.vertices)
     with whole_sections():
         crotch = options.landmarks.get("crotch") or _crotch_height(scan, laid)
         crotch -= float(laid.posed[laid.crotch, 1])
-        moved = Slicer(laid.stood(scan.vertices), scan.triangles, scan.noise, scan.scanned) if laid.moved else scan
+        moved = Slicer(laid.stood(scan.vertices), scan.triangles, scan.noise) if laid.moved else scan
         stands = BodySections(laid.vertices, laid, moved, crotch)
         body = BodySections(laid.posed, laid, scan, crotch) if laid.moved else stands
         found = levels = find_levels(body, laid, scan.noise, options.landmarks)
@@ -142,7 +141,7 @@ def _crotch_height(scan: Slicer, laid: StandingBody) -> float:
     """Return the height [m] of the first level section of a scan, near the body's crotch, of which the largest part is of both legs."""
     vertex, size = float(laid.posed[laid.crotch, 1]), float(laid.posed[:, 1].max())
     for y in np.arange(vertex - 0.010 * size, vertex + 0.012 * size, 0.001):
-        parts = scan.cut(np.array([0.0, 1.0, 0.0]), float(y))
+        parts = scan.cut(UP, float(y))
         largest = max((p.points for p in parts), key=lambda p: float(np.ptp(p[:, 0]) * np.ptp(p[:, 2])), default=None)
         if largest is not None and largest[:, 0].min() < -0.02 * size and largest[:, 0].max() > 0.02 * size:
             return float(y)

@@ -1,9 +1,9 @@
-"""The blueprint of a scanned body."""
+"""What a mannequin of a scanned body is made of."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,21 +11,22 @@ from numpy.typing import NDArray
 from warpflat.core import FloatArray, arc_lengths
 from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.blueprint import Blueprint, Profile
-from warpflat.garment.mannequin.closest import Closest
+from warpflat.garment.mannequin.builder import build_vertices
+from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.layout import RING_LEVELS, Layout
-from warpflat.garment.mannequin.profiles import convex_girth, scale_to_girth
-from warpflat.garment.mannequin.rays import ray_radii
+from warpflat.garment.mannequin.profiles import convex_girth, scale_to_girth, upper_hull
+from warpflat.garment.mannequin.rays import row_at, smooth_radii
 from warpflat.garment.mannequin.read_body import read_body, whole_sections
 from warpflat.garment.mannequin.scan_limbs import leg_curves, underarm_point, upper_curves
-from warpflat.garment.mannequin.scan_measures import ScanMeasure, body_measures, guess_note, missing_note
+from warpflat.garment.mannequin.scan_measures import body_measures, guess_note, missing_note
 from warpflat.garment.mannequin.scan_pose import ScanOptions
 from warpflat.garment.mannequin.scan_sections import BodySections
+from warpflat.garment.mannequin.slicer import UP
 from warpflat.garment.mannequin.table_body import PRINCESS
 
-__all__ = ["ScanFound", "average_sides", "blueprint_from_scan", "sides_note"]
+__all__ = ["attributes_on_scan", "average_sides", "sides_note"]
 
-# Smoothing of the sampled hulls: up the body [rows] and around it [harmonics kept].
-_UP_SIGMA = 1.5
+# Harmonics of the sampled hulls that are kept around the body.
 _HARMONICS = 28
 # Left and right may differ by so much [m] before a note says so.
 _TOLD = 0.010
@@ -35,42 +36,22 @@ _ARM_LEAN = np.radians(11.0)
 _OFF_PLUMB = 0.5
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ScanFound:
-    """The result of slicing a scan.
-
-    Attributes:
-        blueprint: ready for the grid.
-        source: one line for metrics.
-        notes: findings from the shape, one sentence each.
-        sections: length [m] of the body's own section, hollows followed, at every closed level.
-        measures: tapes around the scan itself, by name.
-        scan: vertices (#P by 3 [m]) upright with the legs moved together, and triangles.
-        placed: a matrix (3 by 3) and a shift [m], by which points of the scan come upright, before the legs move.
-    """
-
-    blueprint: Blueprint
-    source: str
-    notes: tuple[str, ...]
-    sections: Mapping[str, float]
-    measures: Mapping[str, ScanMeasure]
-    scan: tuple[FloatArray, NDArray[np.int64]]
-    placed: tuple[FloatArray, FloatArray]
-
-
-def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions) -> ScanFound:
-    """Fit the body model to a scan, lay it on the scan, and slice it into the curves that the grid is laid on.
+def attributes_on_scan(
+    vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions, layout: Layout
+) -> dict[str, Any]:
+    """Return a mannequin's attributes: the body model is fitted to a scan and laid on it, and the grid on its curves.
 
     Args:
         vertices: #V by 3, any unit.
         faces: #F by 3 or 4 (-1 in the last column for a triangle).
         options: what the user knows about the scan.
+        layout: the grid.
 
     Raises:
         InputError: if the mesh is not a body that stands on two legs, or has a measure that no body has.
     """
     read = read_body(vertices, faces, options)
-    body, stands = read.body, read.stands
+    stands, t = read.stands, read.stands.trunk
     levels = {name: level.height for name, level in read.levels.items()}
     with whole_sections():
         underarms = {side: underarm_point(stands, side, levels["underbust"]) for side in ("left", "right")}
@@ -82,17 +63,19 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
             attract=_attractor(stands, levels),
         )  # fmt: skip
         measures = body_measures(read, neck, options.landmarks)
-    t = stands.trunk
+    made = build_vertices(layout, blueprint)
     told = [f"{name} was given: {height:.3f} m" for name, height in options.landmarks.items()]
-    return ScanFound(
-        blueprint=blueprint,
-        source=f"scan of a body {body.stature:.3f} m tall; the body model lies {1000.0 * read.laid.far:.1f} mm off it in the mean",
-        notes=(*read.notes, *told, *guess_note(measures, read.found), *missing_note(measures)),
-        sections={level: float(np.interp(levels[level], t.y, t.length)) for level in RING_LEVELS},
-        measures=measures,
-        scan=(stands.scan.vertices, read.scan.triangles),
-        placed=read.placed,
-    )
+    sides = sides_note(made, layout, averaged=options.symmetric)
+    return {
+        "layout": layout,
+        "vertices": average_sides(made, layout) if options.symmetric else made,
+        "source": f"scan of a body {read.body.stature:.3f} m tall; the body model lies {1000.0 * read.laid.far:.1f} mm off it in the mean",
+        "notes": (*read.notes, *told, *guess_note(measures, read.found), *missing_note(measures), *sides),
+        "sections": {level: float(np.interp(levels[level], t.y, t.length)) for level in RING_LEVELS},
+        "measures": measures,
+        "scan": (stands.scan.vertices, read.scan.triangles),
+        "placed": read.placed,
+    }
 
 
 def _profiles(
@@ -106,14 +89,9 @@ def _profiles(
     middle_z = 0.5 * (t.front + t.back)[rows]
     # A row's rays start from a point that climbs smoothly, or the rows would be twisted against each other.
     start = gaussian_filter1d(middle_z, 3.0, mode="nearest")
-    radii = np.stack([
-        ray_radii(t.hulls[i], np.array([0.0, z]), count, float(t.y[i])) for i, z in zip(rows, start, strict=True)
-    ])  # fmt: skip
-    radii = gaussian_filter1d(radii, _UP_SIGMA, axis=0, mode="nearest")
-    spectrum = np.fft.rfft(radii, axis=1)
-    spectrum[:, _HARMONICS:] = 0.0
-    radii = np.fft.irfft(spectrum, count, axis=1)
     y, girth = t.y[rows], t.girth[rows]
+    middles = np.column_stack([np.zeros_like(start), start])
+    radii = smooth_radii([t.hulls[i] for i in rows], middles, y, count, _HARMONICS)
     # A side seam hangs nearly plumb: halfway between the middle of front and back and the straight line from hip to underarm,
     # and on that line from the bust up, so that it meets the armhole squarely.
     side_z = gaussian_filter1d(middle_z, 14.0, mode="nearest")
@@ -130,23 +108,17 @@ def _profiles(
     widths = np.array([PRINCESS[level] for level in RING_LEVELS]) * apex
 
     def profile(height: float) -> Profile:
-        at = float(np.clip(np.interp(height, y, np.arange(len(y))), 0.0, len(y) - 1.001))
-        i, f = int(at), at - int(at)
-
-        def mix(values: FloatArray) -> FloatArray:
-            return np.asarray((1.0 - f) * values[i] + f * values[i + 1])
-
-        curve = mix(radii)[:, None] * outward + np.array([0.0, float(mix(start))])
+        curve = row_at(radii, y, height)[:, None] * outward + row_at(middles, y, height)
         s = arc_lengths(curve, closed=True)
         half = count // 2
-        z = float(mix(side_z))
+        z = float(row_at(side_z, y, height))
         left = int(np.argmin(np.abs(curve[60 : half - 60, 1] - z))) + 60
         right = int(np.argmin(np.abs(curve[half + 60 : count - 60, 1] - z))) + half + 60
         around = np.vstack([curve, curve[:1]])
         front_x, back_x = (float(np.interp(height, known, widths[:, k])) for k in (0, 1))
         return Profile(
             curve=curve, centre_front=0.0, side_left=_where(curve[:, 1], s, left, z), centre_back=float(s[half]),
-            side_right=_where(curve[:, 1], s, right, z), girth=float(mix(girth)),
+            side_right=_where(curve[:, 1], s, right, z), girth=float(row_at(girth, y, height)),
             princess={
                 "front-left": _share(curve[: left + 1], front_x),
                 "back-left": _share(curve[half : left - 1 : -1], back_x),
@@ -187,23 +159,22 @@ def _attractor(body: BodySections, levels: Mapping[str, float]) -> Callable[[Flo
     middle = points[triangles].mean(axis=1)
     height, half = min((y, abs(x)) for x, y, _ in body.armpits.values())
     inside = np.abs(middle[:, 0]) < half + np.tan(_ARM_LEAN) * np.maximum(middle[:, 1] - height, 0.0) + 0.004
-    closest = Closest(points, triangles[upper & inside])
+    surface = Mesh(points, triangles[upper & inside])
     reach = 0.95 * min(abs(a[0]) for a in body.armpits.values())
     x = np.linspace(-reach, reach, 61)
     y = np.linspace(levels["bust"] - 0.02, levels["front_neck"], 24)
     fronts, backs = np.zeros((len(y), len(x))), np.zeros((len(y), len(x)))
     for i, height in enumerate(y):
-        flat = np.concatenate([p.points for p in slicer.cut(np.array([0.0, 1.0, 0.0]), float(height))])[:, [0, 2]]
+        flat = slicer.points(UP, float(height))[:, [0, 2]]
         flat = flat[np.abs(flat[:, 0]) <= 1.02 * reach]
         middle = 0.5 * (flat[:, 1].min() + flat[:, 1].max())
-        fronts[i] = _upper_hull(flat[flat[:, 1] > middle], x)
-        backs[i] = -_upper_hull(flat[flat[:, 1] <= middle] * np.array([1.0, -1.0]), x)
+        fronts[i] = _upper_side(flat[flat[:, 1] > middle], x)
+        backs[i] = -_upper_side(flat[flat[:, 1] <= middle] * np.array([1.0, -1.0]), x)
     front = RegularGridInterpolator((y, x), fronts, bounds_error=False, fill_value=None)
     back = RegularGridInterpolator((y, x), backs, bounds_error=False, fill_value=None)
 
     def attract(where: FloatArray) -> FloatArray:
-        triangle, weights, _ = closest(where)
-        place = np.asarray(np.einsum("nk,nkd->nd", weights, closest.corners[triangle]))
+        _, _, place = surface.closest(where)
         at = place[:, [1, 0]]
         share = np.clip((levels["front_neck"] - place[:, 1]) / (levels["front_neck"] - levels["bust"]), 0.0, 1.0)
         # Towards the armholes the bridge fades out.
@@ -218,18 +189,12 @@ def _attractor(body: BodySections, levels: Mapping[str, float]) -> Callable[[Flo
     return attract
 
 
-def _upper_hull(points: FloatArray, x: FloatArray) -> FloatArray:
+def _upper_side(points: FloatArray, x: FloatArray) -> FloatArray:
     """Return the upper side of the convex hull of points (x, z), at `x`."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        hull = points[ConvexHull(points).vertices]
-    except (QhullError, ValueError):
-        return np.full(len(x), -np.inf if not len(points) else points[:, 1].max())
-    left, right = int(np.argmin(hull[:, 0])), int(np.argmax(hull[:, 0]))
-    chain = np.roll(hull, -right, axis=0)
-    upper = chain[: (left - right) % len(hull) + 1][::-1]
-    return np.asarray(np.interp(x, upper[:, 0], upper[:, 1]))
+    if not len(points):
+        return np.full(len(x), -np.inf)
+    points = points[np.lexsort(points.T[::-1])]
+    return np.asarray(np.interp(x, *points[upper_hull(points)].T))
 
 
 def average_sides(vertices: FloatArray, layout: Layout) -> FloatArray:

@@ -12,18 +12,19 @@ from warpflat.core import FloatArray, InputError
 from warpflat.garment.mannequin.body_landmarks import near_level, value_at
 from warpflat.garment.mannequin.scan_pose import LEVELS_UP
 from warpflat.garment.mannequin.scan_sections import OUTLINES, BodySections, smooth
+from warpflat.garment.mannequin.slicer import UP
 from warpflat.garment.mannequin.stand_body import StandingBody
 from warpflat.garment.mannequin.summit import summit
 
-__all__ = ["ALIKE", "ISO_HEIGHT", "NOISE", "NOISE_SURE", "TRUNK", "ScanLevel", "find_levels", "noisy", "stretch"]
+__all__ = ["ALIKE", "ISO_HEIGHT", "NOISE", "TRUNK", "ScanLevel", "find_levels", "stretch", "unsure_of"]
 
 #: Levels of the trunk around which a tape is laid, from the top down.
 TRUNK = ("bust", "underbust", "waist", "hip")
-#: More noise than this [m] moves a landmark by more than ISO 20685 allows.
-NOISE_SURE = 0.0012
+# More noise than this [m] moves a landmark by more than ISO 20685 allows.
+_NOISE_SURE = 0.0012
 #: Girths [m] that a tape does not tell apart, and what noise of one metre adds to that; ISO 20685 lets a height differ by so much [m].
 ALIKE, NOISE, ISO_HEIGHT = 0.001, 0.5, 0.004
-_UP = np.array([0.0, 1.0, 0.0])
+_NO_FOLD = "no fold shows under the bust"
 # So far up and down from its landmark the extreme of a level lies, as a share of the stature.
 _REACH = {"bust": 0.020, "waist": 0.036, "hip": 0.030, "calf": 0.016, "ankle": 0.013}
 # Bust points lie so far off the midplane, as shares of the bust's girth; a fold under the bust is followed at this one.
@@ -73,104 +74,15 @@ def find_levels(
     Raises:
         InputError: if the levels do not come in a body's order.
     """
-    t, size = body.trunk, body.stature
-    found: dict[str, ScanLevel] = {}
-
-    def landmark(name: str, side: str = "left") -> float:
-        return float(value_at(near_level(name, side), body.vertices[:, 1]))
-
-    def least(
-        name: str, y: FloatArray, values: FloatArray, around: float, lacking: str, below: float = np.inf
-    ) -> ScanLevel:
-        rows = np.flatnonzero((np.abs(y - around) < _REACH[name] * size) & (y < below))
-        row = int(rows[np.argmin(values[rows])]) if len(rows) else 0
-        if len(rows) < 3 or not rows[0] < row < rows[-1]:
-            return ScanLevel(height=min(around, below), guess=f"{lacking}; it is where the body model has it")
-        alike = y[stretch(values < values[row] + NOISE * noise, row)]
-        moved = noise > 0.0 and float(np.abs(alike - y[row]).max()) > ISO_HEIGHT
-        return ScanLevel(height=summit(y, values, row), guess=noisy(noise) if moved else None)
-
-    def halfway(at: float, shown: float) -> float:
-        """Return the height of what a landmark and the shape both tell: each is a few millimetres off by itself."""
-        return 0.5 * (at + shown) if abs(shown - at) < _NEAR * size else shown
-
-    found["armpit"] = ScanLevel(height=min(float(place[1]) for place in body.armpits.values()))
-    armpit = given.get("armpit", found["armpit"].height)
-    found["hip"] = least("hip", t.y, t.back, landmark("hip"), "the seat does not stand out")
-    # Under a full bust the outline over the bust points bends forward in a fold, lower than on the mean body.
-    at, bust = min(landmark("underbust"), armpit - 0.02 * size), landmark("bust")
-    apart = _BUST_POINT * float(np.interp(bust, t.y, t.girth)) / size
-    outline = smooth(np.array([np.interp(apart, OUTLINES, row) for row in t.outlines]), 2.0)
-    bend = np.gradient(np.gradient(outline, t.y), t.y) * size
-    below = np.flatnonzero((t.y > at - _FOLD_BELOW * size) & (t.y < at))
-    leap = np.diff(t.girth[below]) / t.girth[below[:-1]]
-    # The first fold from just above the landmark down: the next one lies between belly and waist.
-    near = np.flatnonzero((t.y > at - _FOLD_BELOW * size) & (t.y < at + _FOLD_ABOVE * size))
-    folds = near[(bend[near] > _FOLD) & (bend[near] >= bend[near - 1]) & (bend[near] > bend[near + 1])]
-    is_sure = leap.max() > _LEAP or (len(folds) and bend[folds[-1]] > _SURE_FOLD)
-    if leap.max() > _LEAP:
-        at = float(t.y[below[np.argmax(leap)]])
-    elif len(folds):
-        at = halfway(at, summit(t.y, bend, int(folds[-1])))
-    why = noisy(noise) if noise > NOISE_SURE else None
-    found["underbust"] = ScanLevel(height=at, guess=why if is_sure else "no fold shows under the bust")
-    # Over a belly, or under a bust that hangs, the narrowest place may be the underbust itself.
-    around, chest = smooth(t.girth, 1.5 if noise else 0.75), given.get("underbust", at)
-    lacking = "the trunk has no narrowest section below the underbust"
-    found["waist"] = least("waist", t.y, around, landmark("waist"), lacking, chest - _BELOW_UNDERBUST * size)
-    # Bust points are the bust's most prominent places.
-    points = _BUST_POINTS * float(np.interp(bust, t.y, t.girth)) / size
-    ahead = smooth(np.array([np.interp(points, OUTLINES, row).max() for row in t.outlines]), 1.5 if noise else 0.75)
-    shown = least("bust", t.y, -ahead, bust, "no bust stands out", armpit - _BELOW_ARMPIT * size)
-    if is_sure:
-        found["bust"] = ScanLevel(height=halfway(bust, shown.height), guess=shown.guess)
-    else:
-        # A chest without a fold hardly stands out: its place is flat, and the model tells more.
-        why = "no fold shows under it, and it stands out most elsewhere than the body model's"
-        found["bust"] = ScanLevel(height=bust, guess=why if abs(shown.height - bust) > ISO_HEIGHT else shown.guess)
-    waist, hip = (given.get(name, found[name].height) for name in ("waist", "hip"))
-    between = (t.y > hip + 0.38 * (waist - hip)) & (t.y < hip + 0.62 * (waist - hip))
-    belly = float(t.y[between][np.argmax(smooth(t.front, 3)[between])]) if between.any() else 0.5 * (waist + hip)
-    found["abdomen"] = ScanLevel(height=belly)
-    # The outline turns from the shoulder into the neck where it is furthest inside the line between the two.
-    low, at = landmark("front_neck"), landmark("side_neck")
-    upper = np.flatnonzero((t.y > 0.80 * size) & (t.y < 0.91 * size))
-    narrow = float(t.y[upper[np.argmin(t.girth[upper])]])
-    y = t.y[(t.y >= armpit + 0.55 * (narrow - armpit)) & (t.y <= narrow)]
-    wide = [np.concatenate([p.points[:, 0] for p in body.scan.cut(_UP, float(each))]) for each in y]
-    half = smooth(np.array([0.5 * float(np.ptp(x)) for x in wide]), 1.0)
-    inside = np.interp(y, [y[0], y[-1]], [half[0], half[-1]]) - half
-    row = int(np.argmax(np.where(np.abs(y - at) < _NECK * size, inside, -np.inf)))
-    beside = summit(y, inside, row) if 0 < row < len(y) - 1 else at
-    found["front_neck"] = ScanLevel(height=low)
-    found["side_neck"] = ScanLevel(height=float(np.clip(beside, low + 0.008 * size, low + 0.035 * size)))
-    for name, fullest in (("knee", None), ("calf", True), ("ankle", False)):
-        sides = []
-        for side in ("left", "right"):
-            if fullest is None:
-                # Fat moves the skin over a knee: its crease behind, furthest inside the line from calf to thigh, then lies elsewhere.
-                y, back = body.legs.y, smooth(np.array([hull[:, 1].min() for hull in body.legs.hulls[side]]), 3.0)
-                calf, at = landmark("calf", side), landmark(name, side)
-                ends = [calf, 0.86 * body.crotch]
-                inside = back - np.interp(y, ends, np.interp(ends, y, back))
-                row = int(np.argmax(np.where(np.abs(y - at) < _CREASE * size, inside, -np.inf)))
-                crease = summit(y, inside, row)
-                if abs(crease - at) > _KNEE_SURE * size:
-                    sides.append(ScanLevel(height=at, guess="the crease behind it lies elsewhere"))
-                else:
-                    # Each is a few millimetres off the joint by itself.
-                    guess = noisy(noise) if noise > NOISE_SURE else None
-                    sides.append(ScanLevel(height=0.5 * (at + crease), guess=guess))
-            else:
-                # Smoothed little, or the calf, which is rounder above than below, would be moved.
-                girth = smooth(body.legs.girths[side], 3.0 if noise else 1.0)
-                values = -girth if fullest else girth
-                sides.append(least(name, body.legs.y, values, landmark(name, side), "the legs do not show it"))
+    size, found = body.stature, _trunk_levels(body, noise, given)
+    for name in ("knee", "calf", "ankle"):
+        sides = [_leg_level(body, name, side, noise) for side in ("left", "right")]
         guess = next((each.guess for each in sides if each.guess), None)
         found[f"leg_{name}"] = ScanLevel(height=0.5 * (sides[0].height + sides[1].height), guess=guess)
         if name != "calf":
             found[name] = found[f"leg_{name}"]
     found["leg_thigh"] = ScanLevel(height=body.crotch - _BELOW_CROTCH * size)
+    hip = given.get("hip", found["hip"].height)
     found["thigh"] = ScanLevel(height=min(0.44 * size, body.crotch - 0.01 * size, hip - 0.05 * size))
     for name, height in given.items():
         # The thigh's level is that of a skirt, around both legs; a tape around one lies below the crotch.
@@ -190,8 +102,132 @@ def find_levels(
     return found
 
 
-def noisy(noise: float) -> str:
+def _landmark(body: BodySections, name: str, side: str = "left") -> float:
+    return float(value_at(near_level(name, side), body.vertices[:, 1]))
+
+
+def _least(
+    body: BodySections,
+    name: str,
+    y: FloatArray,
+    values: FloatArray,
+    noise: float,
+    lacking: str,
+    *,
+    side: str = "left",
+    below: float = np.inf,
+) -> ScanLevel:
+    """Return where values at some heights are least near a landmark, and below a height; the landmark if they are so nowhere within."""
+    at = _landmark(body, name, side)
+    rows = np.flatnonzero((np.abs(y - at) < _REACH[name] * body.stature) & (y < below))
+    row = int(rows[np.argmin(values[rows])]) if len(rows) else 0
+    if len(rows) < 3 or not rows[0] < row < rows[-1]:
+        return ScanLevel(height=min(at, below), guess=f"{lacking}; it is where the body model has it")
+    alike = y[stretch(values < values[row] + NOISE * noise, row)]
+    moved = noise > 0.0 and float(np.abs(alike - y[row]).max()) > ISO_HEIGHT
+    return ScanLevel(height=summit(y, values, row), guess=_noisy(noise) if moved else None)
+
+
+def _halfway(body: BodySections, at: float, shown: float) -> float:
+    """Return the height of what a landmark and the shape both tell: each is a few millimetres off by itself."""
+    return 0.5 * (at + shown) if abs(shown - at) < _NEAR * body.stature else shown
+
+
+def _trunk_levels(body: BodySections, noise: float, given: Mapping[str, float]) -> dict[str, ScanLevel]:
+    """Return the levels from the hip up."""
+    t, size, sigma = body.trunk, body.stature, 1.5 if noise else 0.75
+    found = {"armpit": ScanLevel(height=min(float(place[1]) for place in body.armpits.values()))}
+    armpit = given.get("armpit", found["armpit"].height)
+    found["hip"] = _least(body, "hip", t.y, t.back, noise, "the seat does not stand out")
+    found["underbust"] = _underbust(body, noise, armpit)
+    # Over a belly, or under a bust that hangs, the narrowest place may be the underbust itself.
+    below = given.get("underbust", found["underbust"].height) - _BELOW_UNDERBUST * size
+    lacking = "the trunk has no narrowest section below the underbust"
+    found["waist"] = _least(body, "waist", t.y, smooth(t.girth, sigma), noise, lacking, below=below)
+    # Bust points are the bust's most prominent places.
+    bust = _landmark(body, "bust")
+    points = _BUST_POINTS * float(np.interp(bust, t.y, t.girth)) / size
+    ahead = smooth(np.array([np.interp(points, OUTLINES, row).max() for row in t.outlines]), sigma)
+    shown = _least(body, "bust", t.y, -ahead, noise, "no bust stands out", below=armpit - _BELOW_ARMPIT * size)
+    if found["underbust"].guess != _NO_FOLD:
+        found["bust"] = ScanLevel(height=_halfway(body, bust, shown.height), guess=shown.guess)
+    else:
+        # A chest without a fold hardly stands out: its place is flat, and the model tells more.
+        why = "no fold shows under it, and it stands out most elsewhere than the body model's"
+        found["bust"] = ScanLevel(height=bust, guess=why if abs(shown.height - bust) > ISO_HEIGHT else shown.guess)
+    waist, hip = (given.get(name, found[name].height) for name in ("waist", "hip"))
+    between = (t.y > hip + 0.38 * (waist - hip)) & (t.y < hip + 0.62 * (waist - hip))
+    belly = float(t.y[between][np.argmax(smooth(t.front, 3)[between])]) if between.any() else 0.5 * (waist + hip)
+    found["abdomen"] = ScanLevel(height=belly)
+    low = _landmark(body, "front_neck")
+    beside = float(np.clip(_side_neck(body, armpit), low + 0.008 * size, low + 0.035 * size))
+    found["front_neck"], found["side_neck"] = ScanLevel(height=low), ScanLevel(height=beside)
+    return found
+
+
+def _underbust(body: BodySections, noise: float, armpit: float) -> ScanLevel:
+    """Return the level under the bust: below a full one the outline over the bust points bends forward in a fold.
+
+    Args:
+        body: the sections.
+        noise: of the scan [m].
+        armpit: height [m].
+    """
+    t, size = body.trunk, body.stature
+    at = min(_landmark(body, "underbust"), armpit - 0.02 * size)
+    apart = _BUST_POINT * float(np.interp(_landmark(body, "bust"), t.y, t.girth)) / size
+    outline = smooth(np.array([np.interp(apart, OUTLINES, row) for row in t.outlines]), 2.0)
+    bend = np.gradient(np.gradient(outline, t.y), t.y) * size
+    below = np.flatnonzero((t.y > at - _FOLD_BELOW * size) & (t.y < at))
+    leap = np.diff(t.girth[below]) / t.girth[below[:-1]]
+    # The first fold from just above the landmark down: the next one lies between belly and waist.
+    near = np.flatnonzero((t.y > at - _FOLD_BELOW * size) & (t.y < at + _FOLD_ABOVE * size))
+    folds = near[(bend[near] > _FOLD) & (bend[near] >= bend[near - 1]) & (bend[near] > bend[near + 1])]
+    is_sure = leap.max() > _LEAP or (len(folds) and bend[folds[-1]] > _SURE_FOLD)
+    if leap.max() > _LEAP:
+        at = float(t.y[below[np.argmax(leap)]])
+    elif len(folds):
+        at = _halfway(body, at, summit(t.y, bend, int(folds[-1])))
+    return ScanLevel(height=at, guess=unsure_of(noise) if is_sure else _NO_FOLD)
+
+
+def _side_neck(body: BodySections, armpit: float) -> float:
+    """Return the height [m] at which the outline turns from the shoulder into the neck: furthest inside the line between the two."""
+    t, size, at = body.trunk, body.stature, _landmark(body, "side_neck")
+    upper = np.flatnonzero((t.y > 0.80 * size) & (t.y < 0.91 * size))
+    narrow = float(t.y[upper[np.argmin(t.girth[upper])]])
+    y = t.y[(t.y >= armpit + 0.55 * (narrow - armpit)) & (t.y <= narrow)]
+    half = smooth(np.array([0.5 * float(np.ptp(body.scan.points(UP, float(each))[:, 0])) for each in y]), 1.0)
+    inside = np.interp(y, [y[0], y[-1]], [half[0], half[-1]]) - half
+    row = int(np.argmax(np.where(np.abs(y - at) < _NECK * size, inside, -np.inf)))
+    return summit(y, inside, row) if 0 < row < len(y) - 1 else at
+
+
+def _leg_level(body: BodySections, name: str, side: str, noise: float) -> ScanLevel:
+    """Return the level of a knee, calf or ankle on one leg."""
+    y, size = body.legs.y, body.stature
+    if name != "knee":
+        # Smoothed little, or the calf, which is rounder above than below, would be moved.
+        girth = smooth(body.legs.girths[side], 3.0 if noise else 1.0)
+        return _least(body, name, y, -girth if name == "calf" else girth, noise, "the legs do not show it", side=side)
+    # Fat moves the skin over a knee: its crease behind, furthest inside the line from calf to thigh, then lies elsewhere.
+    back = smooth(np.array([hull[:, 1].min() for hull in body.legs.hulls[side]]), 3.0)
+    ends, at = [_landmark(body, "calf", side), 0.86 * body.crotch], _landmark(body, "knee", side)
+    inside = back - np.interp(y, ends, np.interp(ends, y, back))
+    crease = summit(y, inside, int(np.argmax(np.where(np.abs(y - at) < _CREASE * size, inside, -np.inf))))
+    if abs(crease - at) > _KNEE_SURE * size:
+        return ScanLevel(height=at, guess="the crease behind it lies elsewhere")
+    # Each is a few millimetres off the joint by itself.
+    return ScanLevel(height=0.5 * (at + crease), guess=unsure_of(noise))
+
+
+def _noisy(noise: float) -> str:
     return f"the scan's noise of {1000.0 * noise:.1f} mm moves it"
+
+
+def unsure_of(noise: float) -> str | None:
+    """Return why noise [m] makes a landmark a guess; None if it does not."""
+    return _noisy(noise) if noise > _NOISE_SURE else None
 
 
 def stretch(rows: np.ndarray, row: int) -> slice:

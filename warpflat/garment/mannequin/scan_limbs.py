@@ -6,13 +6,13 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, arc_lengths, polyline_length, resample
-from warpflat.garment.mannequin.blueprint import ArmCurves, LegCurves, LegProfile, Profile, QuarterCurves
-from warpflat.garment.mannequin.closest import Closest
+from warpflat.core import FloatArray, InputError, arc_lengths, polyline_length, resample, unit
+from warpflat.garment.mannequin.blueprint import NOTCH, ArmCurves, LegCurves, LegProfile, Profile, QuarterCurves
+from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.layout import LEG_LEVELS, QUARTERS
-from warpflat.garment.mannequin.rays import ray_radii
+from warpflat.garment.mannequin.rays import ray_radii, row_at, smooth_radii, with_harmonics
 from warpflat.garment.mannequin.scan_sections import ArmSections, BodySections
-from warpflat.garment.mannequin.slicer import Slicer
+from warpflat.garment.mannequin.slicer import UP, Slicer
 from warpflat.garment.mannequin.table_legs import crotch_curve, profile_of_curve
 
 __all__ = ["leg_curves", "underarm_point", "upper_curves"]
@@ -31,9 +31,8 @@ _HARMONICS = 5
 _STEEP = 10.0
 # Where an arm is sliced between biceps (0), elbow (1) and wrist (2): forearms swell below the elbow.
 _ARM_PLACES = (0.5, 1.25, 1.5, 1.75)
-_NOTCH = 0.22
-# Rays around a leg, their harmonics that are kept, and how far they are smoothed along the leg [rows].
-_COUNT, _LEG_HARMONICS, _UP_SIGMA = 240, 16, 1.5
+# Rays around a leg, and their harmonics that are kept.
+_COUNT, _LEG_HARMONICS = 240, 16
 # The outseam lies in the middle of what is within so much [m] of the outermost, smoothed along the leg [rows].
 _OUTERMOST, _OUTSEAM_SIGMA = 0.004, 6.0
 # Share of the crotch curve's length ahead of the crotch point.
@@ -76,12 +75,12 @@ def upper_curves(
             curve = halves[face]
             rise = (curve[:, 1] - curve[-1, 1]) / max(curve[0, 1] - curve[-1, 1], 1e-9)
             s = arc_lengths(curve)
-            notch = int(np.argmin(np.abs(rise - _NOTCH)))
+            notch = int(np.argmin(np.abs(rise - NOTCH)))
             row = _row(slicer, curve[notch], face)
             first = bust.curve[0 if face == "front" else len(bust.curve) // 2]
             bottom = np.array([0.0, levels["bust"], first[1]])
             quarters[f"{face}-{side}"] = QuarterCurves(
-                neckline=line, bend=0.52, shoulder=seam, armhole=curve, notch=float(s[notch] / s[-1]), chest=row,
+                neckline=line, shoulder=seam, armhole=curve, notch=float(s[notch] / s[-1]), chest=row,
                 centre=_centre(slicer, bottom, row[0], line[0], face),
             )  # fmt: skip
     arms = {side: _arm_curves(arm, holes[side]) for side, arm in body.arms.items()}
@@ -104,24 +103,15 @@ def _loop(
     """
     from scipy.spatial import ConvexHull
 
-    flat = np.column_stack([(points - origin) @ first, (points - origin) @ second])
+    axes = np.array([second, first])
+    flat = (points - origin) @ axes.T
     hull = flat[ConvexHull(flat).vertices]
     middle = 0.5 * (hull.min(axis=0) + hull.max(axis=0))
     if below is not None:
-        middle[1] = (below - origin) @ second
-    corners = hull - middle
-    angle = np.arctan2(corners[:, 1], corners[:, 0]) % (2.0 * np.pi)
-    order = np.argsort(angle)
-    even = resample(corners[order], np.arange(720) / 720, closed=True)
-    even_angle = np.unwrap(np.arctan2(even[:, 1], even[:, 0]))
-    radius = np.linalg.norm(even, axis=1)
+        middle[0] = (below - origin) @ second
+    radii = with_harmonics(ray_radii(hull, middle, count, float(origin[1])), harmonics + 1)
     rays = np.arange(count) * 2.0 * np.pi / count
-    r = np.interp(rays, even_angle % (2.0 * np.pi), radius, period=2.0 * np.pi)
-    spectrum = np.fft.rfft(r)
-    spectrum[harmonics + 1 :] = 0.0
-    r = np.fft.irfft(spectrum, count)
-    plane = middle + np.column_stack([r * np.cos(rays), r * np.sin(rays)])
-    return np.asarray(origin + np.outer(plane[:, 0], first) + np.outer(plane[:, 1], second))
+    return np.asarray(origin + (middle + radii[:, None] * np.column_stack([np.sin(rays), np.cos(rays)])) @ axes)
 
 
 def _neck(body: BodySections, levels: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
@@ -129,7 +119,7 @@ def _neck(body: BodySections, levels: Mapping[str, float]) -> tuple[FloatArray, 
 
     def middle(height: float) -> FloatArray:
         """Return z [m] of the scan in the midplane at a height."""
-        points = np.concatenate([p.points for p in body.scan.cut(np.array([0.0, 1.0, 0.0]), height)])
+        points = body.scan.points(UP, height)
         return np.asarray(points[np.abs(points[:, 0]) < 0.02 * body.stature, 2])
 
     front = np.array([0.0, levels["front_neck"], middle(levels["front_neck"]).max()])
@@ -183,7 +173,7 @@ def underarm_point(body: BodySections, side: str, underbust: float) -> FloatArra
         np.interp(underbust, t.y, t.front) + np.interp(underbust, t.y, t.back),
     )
     z = 0.25 * float(sum(middles))
-    points = np.concatenate([p.points for p in body.slicer.cut(np.array([0.0, 1.0, 0.0]), height)])
+    points = body.slicer.points(UP, height)
     reach = float(np.interp(height, t.y, t.left if sign > 0 else t.right))
     out = sign * points[:, 0]
     trunk = (out > 0.0) & (out < reach + 0.002)
@@ -263,14 +253,13 @@ def _armhole(body: BodySections, side: str, under: FloatArray) -> FloatArray:
 def _shoulder(slicer: Slicer, neck: FloatArray, tip: FloatArray) -> FloatArray:
     """Return the seam from the side neck point to the shoulder point, on the scan's upper side."""
     flat = tip - neck
-    normal = np.cross(flat, np.array([0.0, 1.0, 0.0]))
-    normal /= np.linalg.norm(normal)
+    normal = unit(np.cross(flat, UP))
     t = np.linspace(0.0, 1.0, 40)
     straight = neck + t[:, None] * flat
     along = flat * np.array([1.0, 0.0, 1.0])
     reach = float(np.linalg.norm(along))
     along /= reach
-    points = np.concatenate([p.points for p in slicer.cut(normal, float(neck @ normal))] or [straight])
+    points = slicer.points(normal, float(neck @ normal))
     share = (points - neck) @ along / reach
     line_y = neck[1] + share * flat[1]
     keep = (share > 0.02) & (share < 0.98) & (np.abs(points[:, 1] - line_y) < 0.03)
@@ -287,7 +276,7 @@ def _shoulder(slicer: Slicer, neck: FloatArray, tip: FloatArray) -> FloatArray:
 def _row(slicer: Slicer, notch: FloatArray, face: str) -> FloatArray:
     """Return the across-chest row on the scan, from the midplane to the armhole's notch."""
     sign = 1.0 if face == "front" else -1.0
-    points = np.concatenate([p.points for p in slicer.cut(np.array([0.0, 1.0, 0.0]), float(notch[1]))])
+    points = slicer.points(UP, float(notch[1]))
     side = np.sign(notch[0])
     x = np.linspace(0.0, abs(notch[0]), 30)
     z = np.array([sign * _outermost(sign * points[:, 2], side * points[:, 0] - at, x[1], sign * notch[2]) for at in x])
@@ -300,7 +289,7 @@ def _centre(slicer: Slicer, bottom: FloatArray, chest: FloatArray, top: FloatArr
     """Return the centre line from the bust to the neckline on the scan."""
     sign = 1.0 if face == "front" else -1.0
     y = np.linspace(bottom[1], top[1], 24)
-    points = np.concatenate([p.points for p in slicer.cut(np.array([1.0, 0.0, 0.0]), 1e-4)])
+    points = slicer.points(np.array([1.0, 0.0, 0.0]), 1e-4)
     z = np.interp(y, [bottom[1], chest[1], top[1]], [bottom[2], chest[2], top[2]])
     for i in range(2, len(y) - 1):
         near = points[np.abs(points[:, 2] - z[i]) < 0.05]
@@ -312,7 +301,7 @@ def _centre(slicer: Slicer, bottom: FloatArray, chest: FloatArray, top: FloatArr
 def _arm_curves(arm: ArmSections, hole: FloatArray) -> ArmCurves:
     """Return the curves at biceps, elbow and wrist; they turn with the arm and are not wrung against the armhole `hole`."""
     top = hole[int(np.argmax(hole[:, 1]))]
-    axis = (arm.line[-1] - hole.mean(axis=0)) / np.linalg.norm(arm.line[-1] - hole.mean(axis=0))
+    axis = unit(arm.line[-1] - hole.mean(axis=0))
     beyond = max(float(point @ axis) for point in (hole[0], top)) + _SHORTEST_SLEEVE
     biceps = float(np.clip(np.interp(beyond, arm.line @ axis, arm.s), arm.s[4], arm.elbow - 0.10 * arm.s[-1]))
     places = sorted({0.0, 1.0, 2.0, *_ARM_PLACES})
@@ -323,8 +312,7 @@ def _arm_curves(arm: ArmSections, hole: FloatArray) -> ArmCurves:
     rings: dict[float, FloatArray] = {}
     for place, s in zip(places, along, strict=True):
         at, across = arm.frame(float(s))
-        up = up - across * float(across @ up)
-        up /= np.linalg.norm(up)
+        up = unit(up - across * float(across @ up))
         cut = arm.cut(at, across)
         rings[place] = _loop(cut, cut.mean(axis=0), -up, side * np.cross(across, up), 4, 240)
     return ArmCurves(
@@ -353,13 +341,7 @@ def leg_curves(body: BodySections, levels: Mapping[str, float], hip: Profile) ->
         middle = gaussian_filter1d(np.array([0.5 * (h.min(axis=0) + h.max(axis=0)) for h in hulls]), 2.0, axis=0)
         # Rays turn from the inside over the front: as those of a trunk that looks to the inside.
         turned = [(h - m)[:, ::-1] * np.array([1.0, -1.0]) for h, m in zip(hulls, middle, strict=True)]
-        radii = np.stack([
-            ray_radii(h, np.zeros(2), _COUNT, float(y)) for h, y in zip(turned, legs.y, strict=True)
-        ])  # fmt: skip
-        radii = gaussian_filter1d(radii, _UP_SIGMA, axis=0, mode="nearest")
-        spectrum = np.fft.rfft(radii, axis=1)
-        spectrum[:, _LEG_HARMONICS:] = 0.0
-        radii = np.fft.irfft(spectrum, _COUNT, axis=1)
+        radii = smooth_radii(turned, np.zeros_like(middle), legs.y, _COUNT, _LEG_HARMONICS)
         rays = np.arange(_COUNT) * 2.0 * np.pi / _COUNT
         outward = np.column_stack([-np.cos(rays), np.sin(rays)])
         curves[side] = (radii[..., None] * outward + middle[:, None]) * np.array([sign, 1.0])
@@ -372,9 +354,7 @@ def leg_curves(body: BodySections, levels: Mapping[str, float], hip: Profile) ->
         outseams[side] = gaussian_filter1d(places, _OUTSEAM_SIGMA, mode="nearest")
 
     def profile(side: str, height: float) -> LegProfile:
-        at = float(np.clip(np.interp(height, legs.y, np.arange(len(legs.y))), 0.0, len(legs.y) - 1.001))
-        i, f = int(at), at - int(at)
-        curve = (1.0 - f) * curves[side][i] + f * curves[side][i + 1]
+        curve = row_at(curves[side], legs.y, height)
         near = max(0.0, 1.0 - (thigh - height) / (thigh - knee))
         # At the thigh the inseam stands below the crotch point, from the knee down on the leg's inside.
         s = arc_lengths(curve, closed=True)
@@ -384,10 +364,8 @@ def leg_curves(body: BodySections, levels: Mapping[str, float], hip: Profile) ->
         )
         share = near * float(np.clip(ahead / s[-1], -0.1, 0.1))
         curve = resample(curve, share + np.arange(_COUNT) / _COUNT, closed=True)
-        girth = (1.0 - f) * legs.girths[side][i] + f * legs.girths[side][i + 1]
-        return profile_of_curve(
-            curve, float(girth), near, float((1.0 - f) * outseams[side][i] + f * outseams[side][i + 1])
-        )
+        girth, outseam = (float(row_at(rows[side], legs.y, height)) for rows in (legs.girths, outseams))
+        return profile_of_curve(curve, girth, near, outseam)
 
     heights = {level: levels[level] for level in LEG_LEVELS[1:]}
     return LegCurves(
@@ -413,17 +391,12 @@ def _seat_attractor(body: BodySections, low: float, high: float, half: float) ->
     thighs = [hull for hulls in legs.hulls.values() for hull, y in zip(hulls, legs.y, strict=True) if y > low - room]
     half = max(half, *(float(np.abs(hull[:, 0]).max()) for hull in thighs))
     near = (middle[:, 1] > low - room) & (middle[:, 1] < high + room) & (np.abs(middle[:, 0]) < half + 0.01)
-    corners = points[triangles]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    # A mesh whose faces turn inwards has a negative volume.
-    turn = np.sign(np.einsum("td,td->", normals, corners.mean(axis=1) - points.mean(axis=0)))
-    normals = turn * normals[near]
-    closest = Closest(points, triangles[near])
+    surface = Mesh(points, triangles[near])
 
     def attract(where: FloatArray) -> FloatArray:
-        triangle, weights, _ = closest(where)
-        way = np.einsum("nk,nkd->nd", weights, closest.corners[triangle]) - where
-        return where + np.where(np.einsum("nd,nd->n", way, normals[triangle])[:, None] > 0.0, way, 0.0)
+        triangle, weights, place = surface.closest(where)
+        inside = np.einsum("nd,nd->n", place - where, surface.normals_at(triangle, weights)) > 0.0
+        return np.where(inside[:, None], place, where)
 
     return attract
 
@@ -434,7 +407,7 @@ def _crotch(body: BodySections, hip: float, profile: Profile) -> FloatArray:
 
     front, back = float(profile.curve[0, 1]), float(profile.curve[len(profile.curve) // 2, 1])
     curve = crotch_curve(hip, body.lowest, front, back)
-    cut = np.concatenate([p.points for p in body.slicer.cut(np.array([1.0, 0.0, 0.0]), 1e-5)])
+    cut = body.slicer.points(np.array([1.0, 0.0, 0.0]), 1e-5)
     inside = (cut[:, 1] < hip) & (cut[:, 1] > body.lowest - 1e-6) & (cut[:, 2] < front) & (cut[:, 2] > back)
     flat = np.concatenate([curve[:, [2, 1]], cut[inside][:, [2, 1]]])
     hull = flat[ConvexHull(flat).vertices]

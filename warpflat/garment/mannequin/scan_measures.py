@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError
+from warpflat.core import FloatArray, InputError, unit
 from warpflat.garment.mannequin.body_landmarks import ARM_PLACES, model_places, near_level, near_place
 from warpflat.garment.mannequin.body_model import finer_body
 from warpflat.garment.mannequin.measurements import size_tables
@@ -17,20 +17,18 @@ from warpflat.garment.mannequin.scan_levels import (
     ALIKE,
     ISO_HEIGHT,
     NOISE,
-    NOISE_SURE,
     TRUNK,
     ScanLevel,
-    noisy,
     stretch,
+    unsure_of,
 )
 from warpflat.garment.mannequin.scan_sections import BodySections, smooth, tape_around
-from warpflat.garment.mannequin.slicer import Slicer
+from warpflat.garment.mannequin.slicer import UP, Slicer
 from warpflat.garment.mannequin.stand_body import StandingBody
 from warpflat.garment.mannequin.summit import summit
 
 __all__ = ["ScanMeasure", "body_measures", "guess_note", "missing_note"]
 
-_UP = np.array([0.0, 1.0, 0.0])
 # How far from its landmark a wrist may be narrowest, on the mean body [m].
 _WRIST = 0.013
 # The fullest upper arm is sought from so far beyond the armpit, as a share of the stature: nearer sections hold a part of the shoulder.
@@ -116,8 +114,7 @@ def body_measures(read: ReadBody, neck: float, given: Mapping[str, float]) -> di
         found[f"biceps {side}"] = _biceps(body, side, noise)
         for name, s in places.items():
             height, girth = arm.tape(s)
-            guess = laid.unsure_near(near_place(ARM_PLACES[name], side)[0])
-            guess = guess or (noisy(noise) if noise > NOISE_SURE else None)
+            guess = laid.unsure_near(near_place(ARM_PLACES[name], side)[0]) or unsure_of(noise)
             found[f"{name} {side}"] = ScanMeasure(height=height, girth=girth, guess=guess)
         hand = _hand(scan, body, laid, side)
         if hand is not None and _is_possible("hand", hand.girth, size):
@@ -167,7 +164,7 @@ def body_measures(read: ReadBody, neck: float, given: Mapping[str, float]) -> di
 
 def _around(vertices: FloatArray, height: float) -> float:
     """Return the girth [m] of the finer body model's trunk at a height [m]."""
-    parts = [p.points for p in Slicer(vertices, finer_body()[1]).cut(np.array([0.0, 1.0, 0.0]), height)]
+    parts = [p.points for p in Slicer(vertices, finer_body()[1]).cut(UP, height)]
     return convex_girth(max((p[:, [0, 2]] for p in parts), key=lambda p: float(np.ptp(p[:, 0]))))
 
 
@@ -205,7 +202,7 @@ def _head(slicer: Slicer, stature: float) -> ScanMeasure | None:
     widths: list[float] = []
     holed: list[bool] = []
     for y in heights:
-        parts = [p for p in slicer.cut(_UP, float(y)) if abs(p.points[:, 0].mean()) < 0.06 * stature]
+        parts = [p for p in slicer.cut(UP, float(y)) if abs(p.points[:, 0].mean()) < 0.06 * stature]
         if not parts:
             return None
         largest = max(parts, key=lambda p: float(np.ptp(p.points[:, 0]) * np.ptp(p.points[:, 2])))
@@ -235,7 +232,7 @@ def _fold_of_arm(body: BodySections, side: str) -> FloatArray:
     sign = float(np.sign(armpit[0]))
     before: FloatArray | None = None
     for y in np.arange(armpit[1] - _FOLD_OF_ARM * size, armpit[1] + _FOLD_OF_ARM * size, 0.001):
-        parts = [p.points for p in body.scan.cut(_UP, float(y))]
+        parts = [p.points for p in body.scan.cut(UP, float(y))]
         trunk = [p for p in parts if p[:, 0].min() < 0.0 < p[:, 0].max()]
         if not trunk:
             break
@@ -254,8 +251,7 @@ def _biceps(body: BodySections, side: str, noise: float) -> ScanMeasure:
     """
     arm, armpit = body.arms[side], _fold_of_arm(body, side)
     rows = (arm.s > 0.35 * arm.elbow) & (arm.s < arm.elbow - 0.02 * body.stature)
-    way = arm.way[rows].mean(axis=0)
-    way /= np.linalg.norm(way)
+    way = unit(arm.way[rows].mean(axis=0))
     middle = arm.line[rows].mean(axis=0)
     end = float((arm.frame(arm.elbow)[0] - middle) @ way) - 0.02
     tapes = [
@@ -319,8 +315,7 @@ def _foot(slicer: Slicer, stature: float, side: str) -> ScanMeasure | None:
     except (QhullError, ValueError):
         return None
     # The length runs along which the box around the foot is narrowest.
-    edges = np.roll(corners, -1, axis=0) - corners
-    edges /= np.linalg.norm(edges, axis=1, keepdims=True)
+    edges = unit(np.roll(corners, -1, axis=0) - corners)
     edges *= np.where(edges[:, 1:] < 0.0, -1.0, 1.0)
     breadth = np.ptp(corners @ np.array([edges[:, 1], -edges[:, 0]]), axis=0)
     along = edges[int(np.argmin(breadth))]
@@ -344,5 +339,5 @@ def _foot(slicer: Slicer, stature: float, side: str) -> ScanMeasure | None:
         return None
     _, girth, height = max(tapes)
     # The foot stands on the floor, also where a scan has no sole.
-    guess = _HOLED if holed else noisy(slicer.noise) if slicer.noise > NOISE_SURE else None
+    guess = _HOLED if holed else unsure_of(slicer.noise)
     return ScanMeasure(height=height, girth=girth, guess=guess)

@@ -9,10 +9,10 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import FloatArray, InputError, nearest
+from warpflat.core import FloatArray, InputError, nearest, unit
 from warpflat.flat import join_labels, stray_vertex, stray_words
-from warpflat.garment.mannequin.scan_repair import close_holes, smooth_noise, turned_outward
-from warpflat.garment.mannequin.slicer import Slicer
+from warpflat.garment.mannequin.scan_repair import find_holes, smooth_noise, turned_outward
+from warpflat.garment.mannequin.slicer import UP, Slicer, plane_axes
 from warpflat.garment.mannequin.summit import summit
 
 __all__ = ["LANDMARKS", "LEVELS_UP", "ScanOptions", "across_trunk", "find_facing", "find_legs", "turn_scan_upright"]
@@ -108,9 +108,9 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
             "scan: no face is left where vertices that lie at one place are joined; its places need more digits, or it lies too far from "
             "the origin"
         )
-    scanned, turned = turned_outward(welded, scanned)
-    points, triangles, holes = close_holes(welded, scanned)
-    points, noise = smooth_noise(points, triangles)
+    triangles, turned = turned_outward(welded, scanned)
+    holes = find_holes(welded, triangles)
+    points, noise = smooth_noise(welded, triangles)
     notes = [f"loose pieces of less than 1 % of the scan's faces were left out: {loose}"] if loose else []
     if turned:
         notes.append(f"faces of the scan that were wound inward were turned: {turned} of {len(scanned)}")
@@ -129,22 +129,22 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
         )
     up = _AXES[up_name]
     height = float(np.ptp(points @ up))
-    could_be = (unit for unit, factor in _UNITS.items() if _STATURE[0] <= height * factor <= _STATURE[1])
-    unit = options.unit or next(could_be, None)
-    if unit is None:
+    could_be = (name for name, factor in _UNITS.items() if _STATURE[0] <= height * factor <= _STATURE[1])
+    unit_name = options.unit or next(could_be, None)
+    if unit_name is None:
         raise InputError(
             f"scan: {height:.4g} tall in its own unit, which is a body's height in none of {', '.join(_UNITS)}; scale it"
         )
-    size = height * _UNITS[unit]
+    size = height * _UNITS[unit_name]
     if not _STATURE[0] <= size <= _STATURE[1]:
         raise InputError(
-            f"scan: {size:.3g} m tall if its unit is {unit}: a body is {_STATURE[0]} to {_STATURE[1]} m tall"
+            f"scan: {size:.3g} m tall if its unit is {unit_name}: a body is {_STATURE[0]} to {_STATURE[1]} m tall"
         )
-    if options.unit is None and unit != "m":
-        notes.append(f"the scan's unit was found from its height of {height:.4g}: {unit}")
+    if options.unit is None and unit_name != "m":
+        notes.append(f"the scan's unit was found from its height of {height:.4g}: {unit_name}")
     if up_name != "+y":
         notes.append(f"the scan's head was found towards {up_name}")
-    left = sideways / np.linalg.norm(sideways) if sits else across_trunk(slicer, up, sideways)
+    left = unit(sideways) if sits else across_trunk(slicer, up, sideways)
     ahead = np.cross(left, up)
     if options.facing:
         wished = _AXES[options.facing] - up * (_AXES[options.facing] @ up)
@@ -156,26 +156,26 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
     frame = np.array([left * turn, up, ahead * turn])
     if options.facing is None and frame[2, 2] < 0.9:
         notes.append(f"the scan was found to face ({frame[2, 0]:+.2f}, {frame[2, 1]:+.2f}, {frame[2, 2]:+.2f})")
-    new = points @ frame.T * _UNITS[unit]
+    new = points @ frame.T * _UNITS[unit_name]
     new[:, 1] -= new[:, 1].min()
-    trunk = Slicer(new, triangles).cut(np.array([0.0, 1.0, 0.0]), 0.55 * size)
+    trunk = Slicer(new, triangles).cut(UP, 0.55 * size)
     new[:, 0] -= 0.5 * (trunk[0].points[:, 0].min() + trunk[0].points[:, 0].max())
     if noise:
-        notes.append(f"the scan is noisy by {1000.0 * noise * _UNITS[unit]:.1f} mm; it was smoothed")
+        notes.append(f"the scan is noisy by {1000.0 * noise * _UNITS[unit_name]:.1f} mm; it was smoothed")
     if holes:
         length, place = max(holes, key=lambda hole: hole[0])
-        x, y, z = place @ frame.T * _UNITS[unit] + (new[0] - points[0] @ frame.T * _UNITS[unit])
+        x, y, z = place @ frame.T * _UNITS[unit_name] + (new[0] - points[0] @ frame.T * _UNITS[unit_name])
         notes.append(
-            f"holes closed by smooth patches: {len(holes)}, the longest {length * _UNITS[unit]:.2f} m around "
+            f"holes, over which the body model's skin is taken: {len(holes)}, the longest {length * _UNITS[unit_name]:.2f} m around "
             f"at ({x:.2f}, {y:.2f}, {z:.2f}) m"
         )
     if sits:
         notes.append(
             "the scan sits; its mannequin stands, and warpflat fit --keep-pose carries a garment to it as it sits"
         )
-    upright = Slicer(new, triangles, noise * _UNITS[unit], len(scanned))
+    upright = Slicer(new, triangles, noise * _UNITS[unit_name])
     upright.sits = sits
-    upright.placed = frame.T * _UNITS[unit], new[0] - points[0] @ frame.T * _UNITS[unit]
+    upright.placed = frame.T * _UNITS[unit_name], new[0] - points[0] @ frame.T * _UNITS[unit_name]
     return upright, notes
 
 
@@ -233,26 +233,10 @@ def _without_loose_pieces(
 
 def _hull_area_and_middle(points: FloatArray) -> tuple[float, FloatArray]:
     """Return the area and the centroid of the convex hull of plane points, which do not depend on the plane's axes."""
-    from scipy.spatial import ConvexHull, QhullError
+    import shapely
 
-    try:
-        hull = ConvexHull(points)
-    except QhullError:
-        return 0.0, points.mean(axis=0)
-    ring = points[hull.vertices]
-    after = np.roll(ring, -1, axis=0)
-    wedge = ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]
-    if hull.volume <= 0.0:
-        return 0.0, points.mean(axis=0)
-    return float(hull.volume), np.asarray((ring + after).T @ wedge / (6.0 * hull.volume))
-
-
-def _plane_axes(up: FloatArray) -> FloatArray:
-    """Return two unit vectors at right angles to `up` and to each other, 2 by 3."""
-    first = np.eye(3)[int(np.argmin(np.abs(up)))]
-    first = first - up * (first @ up)
-    first /= np.linalg.norm(first)
-    return np.array([first, np.cross(up, first)])
+    hull = shapely.convex_hull(shapely.MultiPoint(points))
+    return float(hull.area), shapely.get_coordinates(hull.centroid)[0]
 
 
 def find_legs(slicer: Slicer, up: FloatArray, *, sits: bool = False) -> tuple[float, FloatArray | None]:
@@ -264,7 +248,7 @@ def find_legs(slicer: Slicer, up: FloatArray, *, sits: bool = False) -> tuple[fl
     """
     points = slicer.vertices
     low, high = float((points @ up).min()), float((points @ up).max())
-    across = _plane_axes(up)
+    across = plane_axes(up)
 
     def parts(share: float) -> list[_Part]:
         """Return the parts of a horizontal section, largest first, of at least 15 % of the largest one's area."""
@@ -315,8 +299,7 @@ def across_trunk(slicer: Slicer, up: FloatArray, sideways: FloatArray) -> FloatA
     """
     points = slicer.vertices
     low, high = float((points @ up).min()), float((points @ up).max())
-    first = sideways - up * (sideways @ up)
-    first /= np.linalg.norm(first)
+    first = unit(sideways - up * (sideways @ up))
     axes = np.array([first, np.cross(up, first)])
     turns = np.radians(np.arange(0.0, 360.0, 0.5))
     way = np.array([np.cos(turns), np.sin(turns)])
@@ -359,7 +342,7 @@ def find_facing(slicer: Slicer, up: FloatArray, ahead: FloatArray) -> float:
     def spans(a: float, b: float) -> tuple[float, float]:
         cuts = [slicer.cut(up, low + s * size) for s in np.linspace(a, b, 8)]
         trunks = [
-            max(c, key=lambda p: _hull_area_and_middle(p.points @ _plane_axes(up).T)[0]).points @ ahead
+            max(c, key=lambda p: _hull_area_and_middle(p.points @ plane_axes(up).T)[0]).points @ ahead
             for c in cuts
             if c
         ]

@@ -12,16 +12,13 @@ from warpflat.core import BoolArray, FloatArray, InputError, arc_lengths, unit
 from warpflat.garment.mannequin.body_landmarks import ARM_PLACES, model_places, near_place, value_at
 from warpflat.garment.mannequin.body_model import finer_body
 from warpflat.garment.mannequin.profiles import convex_girth
-from warpflat.garment.mannequin.slicer import Slicer
+from warpflat.garment.mannequin.slicer import HOLED, UP, Slicer, plane_axes
 from warpflat.garment.mannequin.stand_body import StandingBody
 
 __all__ = ["OUTLINES", "ArmSections", "BodySections", "LegSections", "TrunkSections", "smooth", "tape_around"]
 
 #: Distances from the midplane at which the outline of the front is followed, as shares of the stature.
 OUTLINES = np.linspace(0.03, 0.08, 11)
-_UP = np.array([0.0, 1.0, 0.0])
-# A section runs over a hole if more than this share of it lies on what the scan does not show.
-_HOLED = 0.1
 # Points of the scan so near to an arm's section [m] are of it.
 _BESIDE = 0.010
 # An arm is sliced at so many places between these distances from the elbow on the mean body [m].
@@ -36,10 +33,7 @@ def smooth(values: FloatArray, sigma: float) -> FloatArray:
 
 def tape_around(points: FloatArray, across: FloatArray) -> tuple[float, float]:
     """Return the middle's height and the convex girth [m] of a section's points, #P by 3, in the plane across a direction."""
-    first = np.eye(3)[int(np.argmin(np.abs(across)))]
-    first = unit(first - across * (first @ across))
-    axes = np.array([first, np.cross(across, first)])
-    return float(0.5 * (points[:, 1].min() + points[:, 1].max())), convex_girth(points @ axes.T)
+    return float(0.5 * (points[:, 1].min() + points[:, 1].max())), convex_girth(points @ plane_axes(across).T)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -188,7 +182,7 @@ class BodySections:
         of_legs: dict[str, list[FloatArray]] = {"left": [], "right": []}
         girths: dict[str, list[float]] = {"left": [], "right": []}
         for y in heights:
-            of_sides = {side: half.cut(_UP, float(y)) for side, half in self.halves.items()}
+            of_sides = {side: half.cut(UP, float(y)) for side, half in self.halves.items()}
             parts = [part for of_side in of_sides.values() for part in of_side]
             if y <= self.crotch and all(of_sides.values()):
                 leg_heights.append(float(y))
@@ -210,7 +204,7 @@ class BodySections:
                 float(np.abs(flat[flat[:, 1] > z_front - 0.004 * stature][:, 0]).mean()), *outline,
             ])  # fmt: skip
             hulls.append(flat[hull.vertices])
-            holed.append(sum(p.patched for p in parts) > _HOLED * rows[-1][1])
+            holed.append(sum(p.patched for p in parts) > HOLED * rows[-1][1])
         table = np.array(rows).T
         trunk = TrunkSections(
             y=heights, girth=table[0], length=table[1], left=table[2], right=table[3], front=table[4], back=table[5],
@@ -245,4 +239,4 @@ def _ways(line: FloatArray) -> FloatArray:
 
     way = np.gradient(gaussian_filter1d(line, 2.0, axis=0, mode="nearest"), axis=0)
     way[:4] = way[4]
-    return np.asarray(way / np.linalg.norm(way, axis=1, keepdims=True))
+    return unit(way)

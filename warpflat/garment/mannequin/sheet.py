@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from warpflat.core import FloatArray, IntArray
 from warpflat.garment.mannequin.layout import LEG_LEVELS, Layout
 
-__all__ = ["fill_fork", "sheet_laplacian"]
+__all__ = ["fill_fork", "fill_sheet", "sheet_laplacian"]
 
-# How strongly the fork is drawn to a scan, against one for its own smoothness, on a grid of 10 mm, and how often.
-_ATTRACT, _ATTRACT_ROUNDS = 0.25, 6
+# How strongly a sheet is drawn to a scan, against one for its own smoothness, on a grid of 10 mm; and how often the fork is.
+_ATTRACT, _FORK_ROUNDS = 0.25, 6
 
 
 def sheet_laplacian(layout: Layout, first_row: int) -> tuple[IntArray, Any, NDArray[np.int64]]:
@@ -40,9 +40,6 @@ def fill_fork(values: FloatArray, layout: Layout, attract: Callable[[FloatArray]
         layout: the grid.
         attract: maps places of the sheet, #P by 3 [m], to those that it is drawn to.
     """
-    from scipy import sparse
-    from scipy.sparse.linalg import factorized, spsolve
-
     # The fork reaches from two rows above the hip to two below the thighs.
     hip, thigh = layout.level_row["hip"], layout.leg_row[LEG_LEVELS[1]]
     legs = [_closed(grid[: thigh + 3]) for grid in layout.legs.values()]
@@ -52,18 +49,49 @@ def fill_fork(values: FloatArray, layout: Layout, attract: Callable[[FloatArray]
     # The outermost rows have no neighbours beyond them, so nothing can be smooth there.
     rims = [layout.rings[hip + 2], *(grid[last + 2] for grid in layout.legs.values())]
     inner = np.setdiff1d(np.arange(len(ids)), local[np.concatenate(rims)])
-    known = np.setdiff1d(np.arange(len(ids)), free)
-    operator = laplacian[inner]
-    unknown, fixed = operator[:, free], operator[:, known]
-    right = -(unknown.T @ (fixed @ values[ids[known]]))
-    values[ids[free]] = spsolve((unknown.T @ unknown).tocsc(), right)
+    fill_sheet(values, layout, ids, laplacian[inner], free)
+    if attract is not None:
+        fill_sheet(values, layout, ids, laplacian[inner], free, attract=attract, rounds=_FORK_ROUNDS)
+
+
+def fill_sheet(
+    values: FloatArray,
+    layout: Layout,
+    ids: IntArray,
+    operator: Any,
+    free: NDArray[np.int64],
+    *,
+    target: FloatArray | float = 0.0,
+    attract: Callable[[FloatArray], FloatArray] | None = None,
+    rounds: int = 0,
+) -> None:
+    """Set some vertices of a sheet to where an operator of all of them comes nearest to its target, by least squares.
+
+    Args:
+        values: layout.vertex_count by 3, places or displacements [m], changed in place.
+        layout: the grid.
+        ids: #S, the sheet's vertices.
+        operator: #R by #S, sparse.
+        free: rows of `ids` that are set.
+        target: #R by 3.
+        attract: maps the places of those, #P by 3 [m], to those that they are drawn to, as they lie when asked.
+        rounds: how often.
+    """
+    from scipy import sparse
+    from scipy.sparse.linalg import factorized
+
+    columns, known = operator.tocsc(), np.setdiff1d(np.arange(len(ids)), free)
+    unknown = columns[:, free]
+    right = np.asarray(unknown.T @ (target - columns[:, known] @ values[ids[known]]))
+    matrix = unknown.T @ unknown
     if attract is None:
+        values[ids[free]] = factorized(matrix.tocsc())(right)
         return
     # The operator shrinks with the square of the edge.
     pull = (_ATTRACT * (layout.resolution / 0.010) ** 2) ** 2
-    solve = factorized((unknown.T @ unknown + pull * sparse.identity(len(free))).tocsc())
-    for _ in range(_ATTRACT_ROUNDS):
-        values[ids[free]] = solve(np.asarray(right + pull * attract(values[ids[free]])))
+    solve = factorized((matrix + pull * sparse.identity(len(free))).tocsc())
+    for _ in range(rounds):
+        values[ids[free]] = solve(right + pull * attract(values[ids[free]]))
 
 
 def _closed(grid: IntArray) -> IntArray:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, arc_lengths, points_at_lengths
+from warpflat.core import FloatArray, InputError, arc_lengths, points_at_lengths, polyline_length, unit
 from warpflat.garment.mannequin.layout import Layout
 
 __all__ = [
@@ -130,10 +130,8 @@ def slide_raglan(layout: Layout, vertices: FloatArray, cut: SleeveCut) -> FloatA
             for number, column in enumerate(columns):
                 share = number / (len(columns) - 1)
                 ids = [*upper[::-1, number], *grid[-2::-1, column]]
-                arc = arc_lengths(vertices[ids])
-                knee = arc[len(upper) - 1]
-                moved = knee + share * (0.01 * depth - at) * arc[-1] / whole
-                out[ids] = points_at_lengths(vertices[ids], np.interp(arc, [0.0, knee, arc[-1]], [0.0, moved, arc[-1]]))
+                farther = share * (0.01 * depth - at) * polyline_length(vertices[ids]) / whole
+                out[ids] = _slid(vertices[ids], len(upper) - 1, farther)
     return out
 
 
@@ -166,10 +164,7 @@ def drop_shoulders(layout: Layout, vertices: FloatArray, cut: SleeveCut) -> Floa
                 column = place[int(row[-1])]
                 near = np.cos(0.5 * np.pi * min(abs(column - middle) / half, 1.0)) ** 2
                 ids = [*row, *arm[1 : biceps + 1, column]]
-                arc = arc_lengths(vertices[ids])
-                knee = arc[len(row) - 1]
-                moved = [0.0, knee + 0.01 * cut.drop_cm * near, arc[-1]]
-                out[ids] = points_at_lengths(vertices[ids], np.interp(arc, [0.0, knee, arc[-1]], moved))
+                out[ids] = _slid(vertices[ids], len(row) - 1, 0.01 * cut.drop_cm * near)
     return out
 
 
@@ -206,7 +201,7 @@ def straighten_hems(
             for first, last in zip(sewn, [*sewn[1:], sewn[0] + arm.shape[1]], strict=True):
                 columns = np.arange(first, last + 1) % arm.shape[1]
                 flat = _unfolded(out[arm[(start + hem) // 2, columns]], out[arm[hem, columns]])
-                along = (flat[-1] - flat[0]) / np.linalg.norm(flat[-1] - flat[0])
+                along = unit(flat[-1] - flat[0])
                 further[columns] = (flat - flat[0]) @ [-along[1], along[0]]
             if hem > layout.arm_row["biceps"]:
                 further -= further[arm.shape[1] // 2]
@@ -214,10 +209,15 @@ def straighten_hems(
                 ids = arm[start : end + 1, column]
                 # Beyond the wrist a sleeve runs on as it comes.
                 line = np.vstack([out[ids], 2.0 * out[ids[-1]] - out[arm[end - 1, column]]])
-                arc = arc_lengths(line)
-                moved = np.interp(arc, [0.0, arc[hem - start], arc[-1]], [0.0, arc[hem - start] + more, arc[-1]])
-                out[ids] = points_at_lengths(line, moved[:-1])
+                out[ids] = _slid(line, hem - start, more)[:-1]
     return out
+
+
+def _slid(line: FloatArray, row: int, farther: float) -> FloatArray:
+    """Return the points of a line slid along it: that of a row so much farther [m], both ends not at all, the others in proportion."""
+    arc = arc_lengths(line)
+    at = np.interp(arc, [0.0, arc[row], arc[-1]], [0.0, arc[row] + farther, arc[-1]])
+    return points_at_lengths(line, at)
 
 
 def _unfolded(upper: FloatArray, lower: FloatArray) -> FloatArray:

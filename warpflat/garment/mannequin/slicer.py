@@ -7,9 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import FloatArray
+from warpflat.core import FloatArray, unit
 
-__all__ = ["Slice", "Slicer"]
+__all__ = ["HOLED", "UP", "Slice", "Slicer", "plane_axes"]
+
+#: A section runs over a hole if more than this share of it lies on what the scan does not show.
+HOLED = 0.1
+#: Across level planes.
+UP = np.array([0.0, 1.0, 0.0])
+
+
+def plane_axes(normal: FloatArray) -> FloatArray:
+    """Return two unit vectors at right angles to a unit vector and to each other, 2 by 3."""
+    first = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    first = unit(first - normal * (first @ normal))
+    return np.array([first, np.cross(normal, first)])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,7 +43,7 @@ class Slice:
     @property
     def is_holed(self) -> bool:
         """Return whether a hole leaves a gap, or more than a tenth of the section runs over patches."""
-        return not self.closed or self.patched > 0.1 * self.length
+        return not self.closed or self.patched > HOLED * self.length
 
 
 class Slicer:
@@ -95,6 +107,10 @@ class Slicer:
             for i in np.argsort(-length)
         ]
         return [p for p in parts if len(p.points) > 3]
+
+    def points(self, normal: FloatArray, offset: float) -> FloatArray:
+        """Return the points of all parts of a section, #P by 3 [m]."""
+        return np.concatenate([np.empty((0, 3)), *(part.points for part in self.cut(normal, offset))])
 
 
 def _part_labels(size: int, pairs: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -18,7 +18,8 @@ from warpflat.core import BoolArray, FloatArray
 from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.body_landmarks import LEVELS, crotch_vertex, meeting, model_places, near_level, value_at
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation, rotation_vector
-from warpflat.garment.mannequin.fit_body import FittedBody, Mesh, fit_body
+from warpflat.garment.mannequin.closest import Mesh
+from warpflat.garment.mannequin.fit_body import FittedBody, fit_body
 
 __all__ = ["StandingBody", "lay_on_scan", "stand_body"]
 
@@ -69,7 +70,7 @@ class StandingBody:
         seen: #V, whether the scan shows the body there.
         armpits: by side, the vertex at which an arm joins the trunk.
         crotch: the lowest vertex between the legs in the midplane.
-        shown: by triangle of the scan, the body's that it shows; -1 for hair, clothes, a floor and patches over holes.
+        shown: by triangle of the scan, the body's that it shows; -1 for hair, clothes and a floor.
         fit: of the model.
         unsure: why the scan is no such body; None if it is.
         doubtful: whether it is none, or hides the crotch, as one that is taken for facing backward does.
@@ -148,13 +149,12 @@ def _bending() -> csr_array:
     return (even.T @ diags_array(stiff) @ even).tocsr()
 
 
-def lay_on_scan(start: FloatArray, mesh: Mesh, patched: BoolArray) -> tuple[FloatArray, BoolArray]:
+def lay_on_scan(start: FloatArray, mesh: Mesh) -> tuple[FloatArray, BoolArray]:
     """Return the finer body's vertices moved from `start` onto a scan (#V by 3 [m]), and which of them the scan shows.
 
     Args:
         start: #V by 3 [m].
         mesh: the scan.
-        patched: by triangle of the scan, whether it closes a hole.
     """
     from scipy.sparse import diags_array
     from scipy.sparse.linalg import cg
@@ -169,8 +169,6 @@ def lay_on_scan(start: FloatArray, mesh: Mesh, patched: BoolArray) -> tuple[Floa
     )
     # Scanners and cloth span webs between arms and trunk.
     nearer = 1.0 - _WEB * np.minimum(1.0, 4.0 * arms * near)
-    on_patch = np.zeros(len(mesh.vertices))
-    on_patch[mesh.triangles[patched]] = 1.0
     for stiffness, far_at_most in _STAGES:
         reach = far_at_most * nearer
         normals = vertex_normals(points, triangles)
@@ -179,9 +177,8 @@ def lay_on_scan(start: FloatArray, mesh: Mesh, patched: BoolArray) -> tuple[Floa
         far = np.linalg.norm(away, axis=1)
         along = np.einsum("va,va->v", away, normals)
         alike = np.einsum("va,va->v", normals, mesh.normals_at(found, share)) > _ALIKE
-        # Beside the border of a hole the nearest place does not lie along the normal, or lies on the border itself.
-        closed = np.einsum("vk,vk->v", share, on_patch[mesh.triangles[found]]) > 1.0 - 1e-3
-        seen = alike & (far < reach) & (np.abs(along) > 0.8 * far - 0.002) & ~closed
+        # Beside the border of a hole the nearest place does not lie along the normal.
+        seen = alike & (far < reach) & (np.abs(along) > 0.8 * far - 0.002)
         # What the scan does not show goes back to the model.
         along = np.where(seen, along, np.einsum("va,va->v", start - points, normals))
         weight = np.where(seen, 1.0 / (1.0 + (far / reach) ** 2) ** 2, _HOME)
@@ -199,7 +196,6 @@ def lay_on_scan(start: FloatArray, mesh: Mesh, patched: BoolArray) -> tuple[Floa
 def stand_body(
     vertices: FloatArray,
     triangles: NDArray[np.int64],
-    scanned: int,
     *,
     faces_ahead: bool = False,
     as_scanned: bool = False,
@@ -211,18 +207,17 @@ def stand_body(
     Args:
         vertices: #V by 3 [m].
         triangles: #T by 3, their normals outward.
-        scanned: triangles from this one on close holes.
         faces_ahead: whether the scan faces +Z for sure; else one that is no body so is tried facing -Z.
         as_scanned: whether the mannequin keeps the scan's pose.
         sits: whether the scan does.
         landmarks: known heights [m], which the fit follows.
     """
-    found = _stand(fit_body(vertices, triangles, landmarks, sits=sits), vertices, triangles, scanned, as_scanned)
+    found = _stand(fit_body(vertices, triangles, landmarks, sits=sits), vertices, triangles, as_scanned)
     if found.doubtful and not faces_ahead and not sits:
         vertices = vertices * [-1.0, 1.0, -1.0]
         fit = fit_body(vertices, triangles, landmarks)
         if fit.cost < found.fit.cost:
-            turned = _stand(fit, vertices, triangles, scanned, as_scanned)
+            turned = _stand(fit, vertices, triangles, as_scanned)
             if turned.unsure is None:
                 return replace(turned, turned=True)
     return found
@@ -246,14 +241,12 @@ def _arms_hanging(model: BodyModel, person: Person) -> tuple[Person, float]:
     return replace(person, bend=bend), most
 
 
-def _stand(
-    fit: FittedBody, vertices: FloatArray, triangles: NDArray[np.int64], scanned: int, as_scanned: bool
-) -> StandingBody:
+def _stand(fit: FittedBody, vertices: FloatArray, triangles: NDArray[np.int64], as_scanned: bool) -> StandingBody:
     from scipy.ndimage import gaussian_filter1d
 
     model, (finer, faces), places = BodyModel.load(), finer_body(), model_places()
     mesh = Mesh(vertices, triangles)
-    posed, seen = lay_on_scan(finer @ model.vertices(fit.person), mesh, np.arange(len(triangles)) >= scanned)
+    posed, seen = lay_on_scan(finer @ model.vertices(fit.person), mesh)
     # A triangle of the scan shows the body's nearest one, if it lies on it and faces the same way.
     on = Mesh(posed, faces)
     middles = vertices[triangles].mean(axis=1)
@@ -261,7 +254,7 @@ def _stand(
     beside = (np.linalg.norm(place - middles, axis=1) < _ON) & (
         np.einsum("ta,ta->t", on.normals_at(shown, share), mesh.normals) > _ALIKE
     )
-    shown = np.where(beside & (np.arange(len(triangles)) < scanned), shown, -1)
+    shown = np.where(beside, shown, -1)
     relaxed, _ = _arms_hanging(model, fit.person.standing(_BENT))
     hanging, elbows = _arms_hanging(model, fit.person)
     standing = model.rebend(fit.person, relaxed, finer, posed)

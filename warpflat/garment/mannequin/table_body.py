@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, arc_lengths, polyline_length, resample
-from warpflat.garment.mannequin.blueprint import ArmCurves, Blueprint, Profile, QuarterCurves
+from warpflat.core import FloatArray, InputError, arc_lengths, polyline_length, resample, unit
+from warpflat.garment.mannequin.blueprint import NOTCH, ArmCurves, Blueprint, Profile, QuarterCurves, mirrored
 from warpflat.garment.mannequin.layout import QUARTERS, RING_LEVELS
 from warpflat.garment.mannequin.measurements import Measurements, size_tables
 from warpflat.garment.mannequin.profiles import Section, section_curve
@@ -29,8 +29,6 @@ _ARM_ANGLE = np.radians(40.0)
 # How far [m] the biceps' row lies beyond the underarm: the shortest sleeve ends there, with a seam to sew. On a small child it is the
 # first of these shares of the arm, under a deep armhole the second one of the way to the elbow.
 _SHORTEST_SLEEVE, _SHORT_SHARE, _TO_ELBOW = 0.092, 0.2, 0.5
-# How high up the armhole the across-chest row ends; the armhole runs slantwise there, which leaves the quads room.
-_NOTCH = 0.22
 
 
 def blueprint_from_measurements(measurements: Measurements) -> Blueprint:
@@ -140,14 +138,14 @@ def _quarters(m: Measurements, profile: Callable[[float], Profile]) -> dict[str,
     side_neck = neckline[quarter]
     slope = _SHOULDER_SLOPE[m.body]
     along = np.array([np.cos(slope), -np.sin(slope), -0.045])
-    tip = side_neck + m.lengths["shoulder"] * along / np.linalg.norm(along)
+    tip = side_neck + m.lengths["shoulder"] * unit(along)
     bust = profile(h["bust"])
     bust_centre_front = np.array([0.0, h["bust"], bust.curve[0, 1]])
     bust_centre_back = np.array([0.0, h["bust"], bust.curve[len(bust.curve) // 2, 1]])
     side = resample(bust.curve, bust.side_left / polyline_length(bust.curve, closed=True), closed=True)
     under = np.array([side[0] + 0.001, h["underarm"], side[1] - 0.002])
     widest = float(bust.curve[np.argmax(bust.curve[:, 0]), 1]) - 0.002
-    level = h["underarm"] + _NOTCH * (tip[1] - h["underarm"])
+    level = h["underarm"] + NOTCH * (tip[1] - h["underarm"])
     reach = {"front": 0.050 * size, "back": -0.053 * size}
     rise = (level - h["bust"]) / (neckline[0, 1] - h["bust"])
     start_front = np.array([0.0, level, (1 - rise) * bust_centre_front[2] + rise * neckline[0, 2] + 0.016 * size])
@@ -165,20 +163,11 @@ def _quarters(m: Measurements, profile: Callable[[float], Profile]) -> dict[str,
         hole, notch = _armhole(chest[face][-1], chest["back" if face == "front" else "front"][-1], under, tip)
         spline = CubicSpline(arc_lengths(centre), centre)
         left = QuarterCurves(
-            neckline=line, bend=0.52, shoulder=np.linspace(side_neck, tip, 50), armhole=hole, notch=notch,
+            neckline=line, shoulder=np.linspace(side_neck, tip, 50), armhole=hole, notch=notch,
             chest=chest[face], centre=spline(np.linspace(0.0, polyline_length(centre), 100)),
         )  # fmt: skip
         curves[f"{face}-left"] = left
-        flip = np.array([-1.0, 1.0, 1.0])
-        curves[f"{face}-right"] = QuarterCurves(
-            neckline=left.neckline * flip,
-            bend=left.bend,
-            shoulder=left.shoulder * flip,
-            armhole=left.armhole * flip,
-            notch=left.notch,
-            chest=left.chest * flip,
-            centre=left.centre * flip,
-        )
+        curves[f"{face}-right"] = mirrored(left)
     return {name: curves[name] for name in QUARTERS}
 
 
@@ -257,11 +246,9 @@ def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, A
     tip, under = front[0], front[-1]
     # The chest is narrower than the back, so that the armhole looks a little forward; the arm leaves square to it.
     across = quarters["front-left"].chest[-1] - quarters["back-left"].chest[-1]
-    axis = np.array([np.sin(_ARM_ANGLE), -np.cos(_ARM_ANGLE), -np.sin(_ARM_ANGLE) * across[0] / across[2]])
-    axis /= np.linalg.norm(axis)
+    axis = unit(np.array([np.sin(_ARM_ANGLE), -np.cos(_ARM_ANGLE), -np.sin(_ARM_ANGLE) * across[0] / across[2]]))
     # Underarm and overarm line of the sleeve begin where those of the armhole are: the sleeve is not wrung.
-    up = (tip - under) - axis * float((tip - under) @ axis)
-    up /= np.linalg.norm(up)
+    up = unit((tip - under) - axis * float((tip - under) @ axis))
     ahead = np.cross(axis, up)
     ahead *= np.sign(ahead[2])
     start = float((tip - middle) @ axis)
@@ -281,8 +268,4 @@ def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, A
         elbow=ring(elbow_at, m.lengths["elbow"], 1.0, 0.004),
         wrist=ring(start + length, m.lengths["wrist"], 1.15, 0.030),
     )
-    flip = np.array([-1.0, 1.0, 1.0])
-    return {
-        "left": left,
-        "right": ArmCurves(biceps=left.biceps * flip, elbow=left.elbow * flip, wrist=left.wrist * flip),
-    }
+    return {"left": left, "right": mirrored(left)}
