@@ -20,7 +20,8 @@ from warpflat.core import (
     points_at_lengths,
     unit,
 )
-from warpflat.garment.mannequin.closest import Mesh
+from warpflat.flat import vertex_normals
+from warpflat.garment.mannequin.exact_closest import Closest
 from warpflat.garment.mannequin.layout import Layout
 from warpflat.garment.mannequin.sheet import fill_sheet, sheet_laplacian
 from warpflat.garment.mannequin.slicer import Slicer
@@ -261,15 +262,22 @@ def _unfolded(points: FloatArray, quads: IntArray, moved: IntArray, along: Float
     return out
 
 
-class _Surface(Mesh):
+class _Surface:
     """A quad mesh that points are brought back to; four triangles around the middle of each quad keep mirror images alike."""
 
     def __init__(self, vertices: FloatArray, quads: IntArray) -> None:
         middles = len(vertices) + np.arange(len(quads))
         triangles = [np.column_stack([quads[:, [k, (k + 1) % 4]], middles]) for k in range(4)]
-        super().__init__(
-            np.vstack([vertices, vertices[quads].mean(axis=1)]), np.concatenate(triangles).astype(np.int64)
-        )
+        self.vertices = np.vstack([vertices, vertices[quads].mean(axis=1)])
+        self.triangles = np.concatenate(triangles).astype(np.int64)
+        self._closest = Closest(self.vertices, self.triangles)
+        normals = vertex_normals(vertices, quads)
+        self._normals = np.vstack([normals, normals[quads].mean(axis=1)])
+
+    def _at(self, values: FloatArray, points: FloatArray) -> FloatArray:
+        """Return what goes with the vertices (#V by 3) at the places nearest to points (#P by 3)."""
+        triangle, weights, _ = self._closest(points)
+        return np.asarray((values[self.triangles[triangle]] * weights[:, :, None]).sum(axis=1))
 
     @cached_property
     def _slicer(self) -> Slicer:
@@ -277,7 +285,7 @@ class _Surface(Mesh):
 
     def nearest(self, points: FloatArray) -> FloatArray:
         """Return the nearest points of the surface (#P by 3 [m])."""
-        return self.closest(points)[2]
+        return self._at(self.vertices, points)
 
     def beside(self, line: FloatArray, first: float, last: float, ends: tuple[FloatArray, FloatArray]) -> FloatArray:
         """Return a line on the surface beside another one (#P by 3 [m]): square to it, so far [m] from its first and its last point.
@@ -293,7 +301,7 @@ class _Surface(Mesh):
         inner = self.vertices[self.triangles].mean(axis=(0, 1))
         out = line
         for _ in range(count):
-            square = unit(np.cross(self.normals_at(*self.closest(out)[:2]), np.gradient(out, axis=0)))
+            square = unit(np.cross(self._at(self._normals, out), np.gradient(out, axis=0)))
             square *= np.sign((square * (inner - out)).sum())
             out = self.nearest(out + step[:, None] * square)
         share = (arc_lengths(out) / arc_lengths(out)[-1])[:, None]

@@ -6,7 +6,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, IntArray, unit
 from warpflat.flat import vertex_normals
-from warpflat.garment.mannequin.closest import Mesh
+from warpflat.garment.mannequin.exact_closest import Closest
 from warpflat.garment.mannequin.layout import Layout
 
 __all__ = ["BodySurface", "push_outside"]
@@ -38,7 +38,7 @@ class BodySurface:
         self.vertices, self.normals = vertices, vertex_normals(vertices, layout.body_faces)
         self.used = np.unique(faces)
         self.tree = cKDTree(vertices[self.used])
-        self.splits = [Mesh(vertices, triangles) for triangles in splits]
+        self.splits = [(triangles, Closest(vertices, triangles)) for triangles in splits]
         self.near = 0.5 * layout.resolution
 
     def vectors_out(self, points: FloatArray) -> FloatArray:
@@ -48,10 +48,11 @@ class BodySurface:
         vertex = self.used[self.tree.query(points)[1]]
         rise = np.einsum("nk,nk->n", points - self.vertices[vertex], self.normals[vertex])
         near = np.flatnonzero(rise < self.near)
-        for split in self.splits if len(near) else ():
-            triangle, weights, place = split.closest(points[near])
-            vector = place - points[near]
-            outward = np.einsum("nk,nkd->nd", weights, self.normals[split.triangles[triangle]])
+        for triangles, closest in self.splits if len(near) else ():
+            triangle, weights, _ = closest(points[near])
+            corners = triangles[triangle]
+            vector = np.einsum("nk,nkd->nd", weights, self.vertices[corners]) - points[near]
+            outward = np.einsum("nk,nkd->nd", weights, self.normals[corners])
             vector[np.einsum("nk,nk->n", vector, outward) <= 0.0] = 0.0
             longer = np.linalg.norm(vector, axis=1) > np.linalg.norm(vectors[near], axis=1)
             vectors[near[longer]] = vector[longer]
