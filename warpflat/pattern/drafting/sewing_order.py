@@ -318,16 +318,17 @@ class _Workshop(SewingTasks):
             """Return whether the end of one seam is that of another one, beyond a seam that is sewn."""
             return any(meet(end[0], pair[0]) and meet(end[1], pair[1]) for pair in (other, other[::-1]))
 
+        seams = [(each, seam, self._ends(seam)) for each in self.tasks if each.technique == "" for seam in each.seams]
+
         def line_of(task: Task) -> tuple[list[Task], bool]:
             """Return the seams that go on into a seam, itself first, and whether they are a ring."""
-            seams = [(each, seam) for each in self.tasks if each.technique == "" for seam in each.seams]
             found, ring = [(task, task.seams[0])], True
             for _, seam in found:
                 for k, end in enumerate(self._ends(seam)):
                     beyond = [
                         (each, other)
-                        for each, other in seams
-                        for n, pair in enumerate(self._ends(other))
+                        for each, other, ends in seams
+                        for n, pair in enumerate(ends)
                         if (other is not seam or n != k) and goes_on(end, pair)
                     ]
                     ring = ring and bool(beyond)
