@@ -245,7 +245,7 @@ def _assert_every_edge_is_used_up_by_one_step(drafted: DraftedGarment) -> None:
     words = " ".join(step.words for step in steps)
     # Left and right, drawn once, have one letter.
     assert all(words.count(f" {letter} (") == letters.count(letter) for letter in letters)
-    assert [each for step in steps for each in step.notions] == list(notions(drafted, only_size(drafted))[1:])
+    assert [each for step in steps for each in step.notions] == list(notions(steps)[1:])
     # Nothing is left to the maker, but the lower edge of a hat that is lined.
     assert {step.technique for step in steps} & {"bind_raw", "raw"} <= (
         {"bind_raw"} if drafted.name == "sun_hat" else set()
@@ -301,9 +301,9 @@ def _assert_every_printed_word_is_german(drafted: DraftedGarment) -> None:
     size, words = only_size(drafted), Misses(language_words("de"))
     garment = replace(drafted, garment=replace(drafted.garment, words=words))
     with printed_in(words):
-        sewing_steps(garment, size)
-        notions(garment, size)
-        tools(garment, size)
+        steps = sewing_steps(garment, size)
+        notions(steps)
+        tools(garment, steps)
         finished_lengths(garment, size)
         for piece in garment.pieces[size]:
             draw_piece(piece)

@@ -16,7 +16,7 @@ from warpflat.garment.construction.openings import Opening
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.fitting import drawn_length
 from warpflat.pattern.drafting.pieces import Pattern
-from warpflat.pattern.drafting.sewing_order import notions
+from warpflat.pattern.drafting.sewing_order import notions, sewing_steps
 
 ZIP = Opening(kind="zip", line="centre back", length=0.4)
 FACING = Finishing(kind="facing", edge="neck", width=0.055)
@@ -95,7 +95,7 @@ def test_waistband_ends_at_the_zip(parted: Garment):
     # What runs past one end has the button, and the buttonhole lies as far from the other one: closed, both ends meet at the zip.
     np.testing.assert_allclose(band.marks["button"], [length + 0.0125, 0.015])
     np.testing.assert_allclose(band.internal_lines["buttonhole"].mean(axis=0), [0.0125, 0.015])
-    assert "1 hook and bar" not in notions(draft_garment(pattern), "")
+    assert "1 hook and bar" not in notions(sewing_steps(draft_garment(pattern), ""))
 
 
 def test_armholes_get_a_binding_each(parted: Garment):

@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from warpflat.garment.mannequin.closest import Mesh
+from warpflat.garment.mannequin.exact_closest import Closest
 
 
 def test_nearest_places_are_those_of_a_search_over_all_triangles() -> None:
@@ -14,13 +15,17 @@ def test_nearest_places_are_those_of_a_search_over_all_triangles() -> None:
     vertices, triangles = random.normal(size=(60, 3)), random.permutation(60).reshape(20, 3)
     points = random.normal(size=(50, 3))
     found, weights, places = Mesh(vertices, triangles).closest(points)
+    exact, shares, distances = Closest(vertices, triangles)(points)
     given = trimesh.Trimesh(vertices, triangles, process=False)
-    for point, face, weight, place in zip(points, found, weights, places, strict=True):
+    rows = zip(points, found, weights, places, exact, shares, distances, strict=True)
+    for point, face, weight, place, same, share, distance in rows:
         each = trimesh.triangles.closest_point(given.triangles, np.tile(point, (20, 1)))
         far = np.linalg.norm(each - point, axis=1)
         assert np.linalg.norm(place - point) == pytest.approx(far.min(), abs=1e-6)
         assert far[face] == pytest.approx(far.min(), abs=1e-6)
         np.testing.assert_allclose(weight @ vertices[triangles[face]], place, atol=1e-12)
+        assert distance == pytest.approx(far.min(), abs=1e-12)
+        np.testing.assert_allclose(np.linalg.norm(share @ vertices[triangles[same]] - point), distance, atol=1e-12)
 
 
 def test_a_place_on_an_edge_has_one_normal_whichever_triangle_it_is_told_of() -> None:

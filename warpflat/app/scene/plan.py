@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -84,7 +85,7 @@ _ALONE = 4000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Plan:
+class Plan(ABC):
     """A garment, wherever its pieces come from. Who takes one does not ask for its kind.
 
     Attributes:
@@ -102,10 +103,11 @@ class Plan:
     found: FoundSeams | None = None
 
     @property
+    @abstractmethod
     def surfaces(self) -> list[Surface]:
         """The pieces in space, uncut."""
-        raise NotImplementedError
 
+    @abstractmethod
     def flatten(
         self,
         *,
@@ -121,15 +123,14 @@ class Plan:
         Raises:
             InputError: a piece cannot be flattened, or a seam or a constraint asks what it cannot be.
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def in_cloth(self, scene: Scene) -> Plan:
         """Return the same garment as another scene has it, which differs in its fabric; its pieces have the same points.
 
         Raises:
             InputError: the fabric is wrong.
         """
-        raise NotImplementedError
 
     def advise(self, piece: Flattening) -> Flattening:
         """Return a piece with cuts that would help where it does not fit."""

@@ -162,17 +162,14 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
     return tuple(steps)
 
 
-def notions(garment: DraftedGarment, size: str) -> tuple[str, ...]:
+def notions(steps: Sequence[SewingStep]) -> tuple[str, ...]:
     """Return what is needed beside the cloth: thread, and what the steps take: zips, elastics, buttons and hooks."""
-    return (
-        translate("sewing thread"),
-        *(each for step in sewing_steps(garment, size) for each in step.notions),
-    )
+    return translate("sewing thread"), *(each for step in steps for each in step.notions)
 
 
-def tools(garment: DraftedGarment, size: str) -> str:
-    """Return what the garment is made with, in words."""
-    used = {techniques()[step.technique].get("tool") for step in sewing_steps(garment, size)}
+def tools(garment: DraftedGarment, steps: Sequence[SewingStep]) -> str:
+    """Return what the garment is made with in its steps, in words."""
+    used = {techniques()[step.technique].get("tool") for step in steps}
     needed = ["paper scissors and glue or tape", "cloth scissors", "tape measure", "chalk", "pins", "iron"]
     needed += ["sewing machine", "hand needle", *(tool for tool in ("zip foot", "buttonhole foot") if tool in used)]
     if garment.garment.worn is not None and garment.garment.worn.knits:

@@ -136,8 +136,9 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
         words = ", ".join(f"{what} {page.length(length)}" for what, length in lengths.items())
         page.paragraph(words, indent=0.030, lead=translate("Finished"))
     page.heading(translate("You need"), 3 * LINE)
-    page.paragraph(", ".join(notions(whole, size)), indent=0.030, lead=translate("Notions"))
-    page.paragraph(tools(whole, size), indent=0.030, lead=translate("Tools"))
+    steps = sewing_steps(whole, size)
+    page.paragraph(", ".join(notions(steps)), indent=0.030, lead=translate("Notions"))
+    page.paragraph(tools(whole, steps), indent=0.030, lead=translate("Tools"))
     _cloth(page, whole)
     _pieces_to_cut(page, pieces)
     widths: dict[str, set[float]] = {"seam": set(), "hem": set()}
@@ -166,7 +167,7 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
         + " "
         + translate("Press each seam when it is sewn, and neaten edges that stay open inside.")
     )
-    for number, sewing in enumerate(sewing_steps(whole, size), 1):
+    for number, sewing in enumerate(steps, 1):
         _step(page, number, sewing, [(p, sewing.sewn[p.name]) for p in whole.pieces[size] if p.name in sewing.sewn])
     if seams := sewn_seams(whole, size):
         page.heading(translate("Seams") + (f", {printed_size(size)}" if len(whole.pieces) > 1 else ""), 3 * LINE)
