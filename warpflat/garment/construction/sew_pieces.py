@@ -88,14 +88,14 @@ def sew_pieces(
     first = next(iter(flat))
     found = surface_seams(flat[first].network.surface, seams)
     # More cloth along the sides that are meant to be longer.
-    longer = [(seam, seam.vertices[seam.named.longer]) for seam in found if seam.named.factor > 1.0]
+    longer = [(seam, pair.vertices[seam.longer]) for seam, pair in zip(seams, found, strict=True) if seam.factor > 1.0]
     if longer and flat[first].cuts:
         raise InputError(
-            f"seam {longer[0][0].named.name!r}: fullness and gathers need a piece that is not cut; leave out the cuts or the fullness"
+            f"seam {longer[0][0].name!r}: fullness and gathers need a piece that is not cut; leave out the cuts or the fullness"
         )
     if longer:
-        full = [FullEdge(vertices=row, factor=seam.named.factor, gathered=seam.named.gathered) for seam, row in longer]
-        rows = [row for seam in found for row in seam.vertices]
+        full = [FullEdge(vertices=row, factor=seam.factor, gathered=seam.gathered) for seam, row in longer]
+        rows = [row for pair in found for row in pair.vertices]
         flat[first] = give_fullness(flat[first], full, rows, options=options)
     pairs = [
         Stitching(
@@ -105,13 +105,7 @@ def sew_pieces(
         for name, piece in flat.items()
         for title, _, seam in seams_of_cuts(piece)
     ]  # fmt: skip
-    pairs += [
-        Stitching(
-            name=seam.named.name, pieces=(first, first), vertices=seam.vertices, ratio=1.0 / (1.0 + seam.named.ease),
-            joints=seam.joints, sides=(f"{first}.{seam.named.sides[0]}", f"{first}.{seam.named.sides[1]}"),
-        )
-        for seam in found
-    ]  # fmt: skip
+    pairs += found
     borders = {name: piece.network.surface for name, piece in flat.items()}
     for pair in meeting_borders(borders, without=_sewn_edges(pairs)):
         if len(flat) > 1:
