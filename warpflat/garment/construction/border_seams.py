@@ -17,10 +17,10 @@ from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest
 from warpflat.flat import Surface, border_loops
 from warpflat.garment.construction.sewn import Stitching
 
-__all__ = ["BorderSeam", "surface_seams"]
+__all__ = ["ONE_CURVE", "BorderSeam", "surface_seams"]
 
-#: Sides that keep this near [m] to each other in space are one curve.
-_SHARED = 1e-3
+#: Borders that keep this near [m] to each other in space are one curve.
+ONE_CURVE = 1e-3
 #: Other sides differ in length by no more than these shares: any, and those with as many vertices.
 _ALIKE, _AS_MANY = 0.01, 0.05
 #: Vertices that agree in their share of the length within this part of an edge are sewn edge by edge.
@@ -76,7 +76,7 @@ def surface_seams(surface: Surface, named: Sequence[BorderSeam]) -> list[Stitchi
             one, other = surface.vertices[first], surface.vertices[second]
             # Two stretches of one border meet running against each other.
             second, other = second[::-1].copy(), other[::-1]
-            shared = max(_largest_distance(one, other), _largest_distance(other, one)) <= _SHARED
+            shared = max(_largest_distance(one, other), _largest_distance(other, one)) <= ONE_CURVE
             if shared and np.linalg.norm(one[0] - other[-1]) < np.linalg.norm(one[0] - other[0]):
                 raise InputError(
                     f"{seam.sides[0]!r} and {seam.sides[1]!r} lie on each other the same way round, face to back; sides meet face to face"
