@@ -42,13 +42,11 @@ from warpflat.garment import (
     Garment,
     Mannequin,
     OpeningTable,
-    PatternOptions,
     SeamWish,
     SewnPanel,
     cap_wishes,
     check_edge_names,
     check_fold_grain,
-    check_names,
     dart_along,
     find_fold_lines,
     flatten_form,
@@ -64,6 +62,7 @@ from warpflat.garment import (
     straight_stands,
     unsewn_notes,
 )
+from warpflat.pattern import PatternOptions, check_names
 
 if TYPE_CHECKING:
     from warpflat.pattern import Pattern

@@ -11,12 +11,12 @@ import numpy as np
 
 from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest, other_side, without_side
 from warpflat.garment.construction.details import OpeningTable
-from warpflat.garment.construction.edge_rules import EdgeRules
 from warpflat.garment.construction.rings import find_rings, ring_line
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.forms import Form, PieceRecipe
 from warpflat.garment.mannequin.halves import is_side
 from warpflat.garment.mannequin.layout import RING_LEVELS
+from warpflat.pattern import EdgeRules
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.forms import FormResult
