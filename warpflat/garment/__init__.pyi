@@ -19,7 +19,6 @@ from .construction.drawn_curves import CURVES_MM as CURVES_MM
 from .construction.ease import SeamWish as SeamWish
 from .construction.ease import cap_wishes as cap_wishes
 from .construction.ease import seam_ratios as seam_ratios
-from .construction.edge_rules import EdgeRules as EdgeRules
 from .construction.file_seams import FILE_SEAMS as FILE_SEAMS
 from .construction.file_seams import MOST_ISLANDS as MOST_ISLANDS
 from .construction.file_seams import FileSeams as FileSeams
@@ -34,6 +33,8 @@ from .construction.form_plan import check_fold_grain as check_fold_grain
 from .construction.form_plan import find_fold_lines as find_fold_lines
 from .construction.form_plan import plan_form as plan_form
 from .construction.garment import Garment as Garment
+from .construction.garment_files import garment_files as garment_files
+from .construction.garment_files import surface_files as surface_files
 from .construction.girths import pattern_girths as pattern_girths
 from .construction.graded import graded_layout as graded_layout
 from .construction.graded import stretches_worn as stretches_worn
@@ -46,15 +47,6 @@ from .construction.openings import Opening as Opening
 from .construction.openings import opened_rings as opened_rings
 from .construction.openings import part_at_centres as part_at_centres
 from .construction.openings import sized_opening as sized_opening
-from .construction.pattern_files import PatternOptions as PatternOptions
-from .construction.pattern_files import WrittenPattern as WrittenPattern
-from .construction.pattern_files import check_names as check_names
-from .construction.pattern_files import export_patterns as export_patterns
-from .construction.pattern_files import garment_files as garment_files
-from .construction.pattern_files import lay_markers as lay_markers
-from .construction.pattern_files import outline_files as outline_files
-from .construction.pattern_files import pattern_names as pattern_names
-from .construction.pattern_files import surface_files as surface_files
 from .construction.pockets import Pocket as Pocket
 from .construction.rings import measure_rings as measure_rings
 from .construction.rings import rings_line as rings_line

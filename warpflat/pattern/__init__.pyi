@@ -1,12 +1,9 @@
 """Flat pieces on paper: drafting, drawings and files of patterns."""
 
 from .drafting.corners import find_corners as find_corners
-from .drafting.curves import TOLERANCE as TOLERANCE
 from .drafting.curves import curve_through as curve_through
-from .drafting.cut_list import cloths_of as cloths_of
-from .drafting.cut_list import cut_list as cut_list
 from .drafting.draft import draft_garment as draft_garment
-from .drafting.drafted import DraftedGarment as DraftedGarment
+from .drafting.edge_rules import EdgeRules as EdgeRules
 from .drafting.fairing import count_inflections as count_inflections
 from .drafting.fairing import fair_line as fair_line
 from .drafting.fairing import fairest_line as fairest_line
@@ -18,9 +15,7 @@ from .drafting.from_mesh import piece_from_mesh as piece_from_mesh
 from .drafting.marker import Cloth as Cloth
 from .drafting.marker import make_marker as make_marker
 from .drafting.matched_lay import Stripes as Stripes
-from .drafting.notches import MEET as MEET
 from .drafting.piece_parts import DEFAULT_ALLOWANCE as DEFAULT_ALLOWANCE
-from .drafting.piece_parts import EDGE_KINDS as EDGE_KINDS
 from .drafting.piece_parts import FOLD_STRAIGHT as FOLD_STRAIGHT
 from .drafting.piece_parts import HEMMED_LEVELS as HEMMED_LEVELS
 from .drafting.piece_parts import Dart as Dart
@@ -40,9 +35,6 @@ from .drafting.seam_difference import eased_length as eased_length
 from .drafting.seam_words import joint_words as joint_words
 from .drafting.sewing_tasks import is_flounce as is_flounce
 from .drafting.shrinkage import Shrinkage as Shrinkage
-from .drafting.shrinkage import enlarged as enlarged
-from .drafting.walked import WalkedSeam as WalkedSeam
-from .drafting.walked import walk_seams as walk_seams
 from .drafting.whole_pieces import MIRRORED as MIRRORED
 from .drafting.whole_pieces import hole_edges as hole_edges
 from .drafting.whole_pieces import turn_over as turn_over
@@ -66,7 +58,6 @@ from .export.colours import energy_scale as energy_scale
 from .export.colours import linear_rgb as linear_rgb
 from .export.dressed import Body as Body
 from .export.dressed import dress as dress
-from .export.dxf import write_dxf as write_dxf
 from .export.figure import DPI as DPI
 from .export.figure import GREY as GREY
 from .export.figure import INK as INK
@@ -78,7 +69,6 @@ from .export.figure import picture_of as picture_of
 from .export.figure import write_figure as write_figure
 from .export.figure import write_moving_picture as write_moving_picture
 from .export.fit_picture import write_wear_sheet as write_wear_sheet
-from .export.garmentcode import write_garmentcode as write_garmentcode
 from .export.geometry import Polylines as Polylines
 from .export.geometry import corner_mean as corner_mean
 from .export.geometry import face_areas as face_areas
@@ -89,23 +79,24 @@ from .export.letters import all_letters as all_letters
 from .export.letters import note_on_names as note_on_names
 from .export.obj import write_obj as write_obj
 from .export.packing import rows_on_table as rows_on_table
+from .export.pattern_files import CLOTH_WIDTH as CLOTH_WIDTH
+from .export.pattern_files import PatternOptions as PatternOptions
+from .export.pattern_files import WrittenPattern as WrittenPattern
+from .export.pattern_files import check_names as check_names
+from .export.pattern_files import export_patterns as export_patterns
+from .export.pattern_files import lay_markers as lay_markers
+from .export.pattern_files import pattern_names as pattern_names
+from .export.pattern_files import write_pattern as write_pattern
 from .export.pattern_json import read_pattern_json as read_pattern_json
-from .export.pattern_json import write_pattern_json as write_pattern_json
-from .export.pdf import too_many_sheets as too_many_sheets
-from .export.pdf import write_pdf as write_pdf
 from .export.picture import DraftedOutline as DraftedOutline
 from .export.piece_files import plot as plot
 from .export.piece_files import save_piece as save_piece
 from .export.piece_files import write_pieces as write_pieces
-from .export.plt import write_plt as write_plt
 from .export.read_dxf import read_dxf as read_dxf
 from .export.read_pattern import PATTERN_ENDINGS as PATTERN_ENDINGS
-from .export.read_pattern import read_drafted as read_drafted
 from .export.read_pattern import read_pattern as read_pattern
 from .export.read_svg import read_svg as read_svg
 from .export.sewn_usd import write_sewn_usd as write_sewn_usd
-from .export.svg import write_marker_svg as write_marker_svg
-from .export.svg import write_svg as write_svg
 from .export.usd import DRAFTED as DRAFTED
 from .export.usd import FrameWriter as FrameWriter
 from .export.usd import film_scale as film_scale

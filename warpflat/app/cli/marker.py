@@ -117,8 +117,7 @@ def marker(
       warpflat marker drawing.svg --one-way --seconds 60
     """
     from warpflat.core import InputError
-    from warpflat.garment import lay_markers
-    from warpflat.pattern import Cloth, Stripes
+    from warpflat.pattern import Cloth, Stripes, lay_markers
 
     if seams and not (repeat_warp or repeat_weft):
         raise InputError("--match: needs the repeat of the stripes, --repeat-warp MM or --repeat-weft MM")

@@ -8,7 +8,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from warpflat.app.scene.schema import FinishingTable, PocketTable, SceneTable
-from warpflat.garment import CENTRES, COLLARS, FINISHES, Buttons, Collar, EdgeRules, Finishing, Opening, Pocket
+from warpflat.garment import CENTRES, COLLARS, FINISHES, Buttons, Collar, Finishing, Opening, Pocket
+from warpflat.pattern import EdgeRules
 
 if TYPE_CHECKING:
     from warpflat.garment import Constraint, FormResult

@@ -43,13 +43,11 @@ from warpflat.garment import (
     Garment,
     Mannequin,
     Opening,
-    PatternOptions,
     SeamWish,
     SewnPanel,
     cap_wishes,
     check_edge_names,
     check_fold_grain,
-    check_names,
     dart_along,
     find_fold_lines,
     flatten_form,
@@ -63,6 +61,7 @@ from warpflat.garment import (
     sized_opening,
     unsewn_notes,
 )
+from warpflat.pattern import PatternOptions, check_names
 
 if TYPE_CHECKING:
     from warpflat.pattern import Pattern

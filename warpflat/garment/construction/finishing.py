@@ -26,8 +26,8 @@ from warpflat.garment.construction.flounces import with_flounce
 from warpflat.garment.construction.free_edges import Break, FreeChain, chain_allowance, chain_length, free_chains
 from warpflat.garment.construction.plackets import with_placket, with_slits
 from warpflat.garment.construction.shaped_band import shortened, slant_rises, with_shaped_waistband
-from warpflat.garment.construction.strips import CLOTH_WIDTH, NARROW, Strip, panel_count
-from warpflat.pattern import Edge, Elastic, Pattern, Piece, SeamSide
+from warpflat.garment.construction.strips import NARROW, Strip, panel_count
+from warpflat.pattern import CLOTH_WIDTH, Edge, Elastic, Pattern, Piece, SeamSide
 
 __all__ = ["FINISHES", "Finishing", "finish_edges", "hem_rises", "with_plackets"]
 
