@@ -61,7 +61,6 @@ from .export.dressed import dress as dress
 from .export.figure import DPI as DPI
 from .export.figure import GREY as GREY
 from .export.figure import INK as INK
-from .export.figure import PAGE_WIDTH as PAGE_WIDTH
 from .export.figure import Pen as Pen
 from .export.figure import drawn_page as drawn_page
 from .export.figure import new_figure as new_figure
