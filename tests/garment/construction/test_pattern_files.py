@@ -28,21 +28,22 @@ from warpflat.core.errors import InputError
 from warpflat.flat.flattening.flatten_piece import flatten
 from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.flat.surface.shapes import make_shape
-from warpflat.garment.construction.edge_rules import EdgeRules
 from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.garment import Garment as Flattened
-from warpflat.garment.construction.pattern_files import PatternOptions, export_patterns, surface_files
+from warpflat.garment.construction.garment_files import surface_files
 from warpflat.garment.construction.to_pattern import check_edge_names, pattern_of_surface
 from warpflat.garment.mannequin.forms import FormResult
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.pattern.drafting.curves import fit_curve
 from warpflat.pattern.drafting.draft import draft_garment, draft_piece
 from warpflat.pattern.drafting.drafted import DraftedGarment
+from warpflat.pattern.drafting.edge_rules import EdgeRules
 from warpflat.pattern.drafting.half_pieces import halved
 from warpflat.pattern.drafting.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import Piece
 from warpflat.pattern.drafting.tile_nesting import orders
 from warpflat.pattern.export.dxf import write_dxf
+from warpflat.pattern.export.pattern_files import PatternOptions, export_patterns
 from warpflat.pattern.export.pattern_json import pattern_from_json, pattern_json, read_pattern_json
 from warpflat.pattern.export.pdf import draw_sheet, sheet_names, write_pdf
 from warpflat.pattern.export.svg import write_svg

@@ -19,10 +19,10 @@ from warpflat.flat.flattening.flatten_piece import flatten
 from warpflat.flat.surface.io.read_pieces import read_pieces
 from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.garment.construction import to_pattern
-from warpflat.garment.construction.edge_rules import EdgeRules
 from warpflat.garment.construction.sew_pieces import meeting_borders, sew_pieces
 from warpflat.garment.construction.sewing import SewingNetwork
 from warpflat.garment.construction.to_pattern import LACKING, pattern_of_garment
+from warpflat.pattern.drafting.edge_rules import EdgeRules
 from warpflat.pattern.drafting.pieces import Pattern
 from warpflat.pattern.drafting.whole_pieces import whole_pieces
 from warpflat.pattern.export.pattern_json import read_pattern_json
