@@ -20,7 +20,7 @@ from typing import Any
 from warpflat.app.scene.load import load_scene, make_scene
 from warpflat.app.scene.plan import plan_garment
 from warpflat.flat.model.fit import TOLERATED
-from warpflat.garment.construction.pattern_files import garment_files
+from warpflat.garment.construction.garment_files import garment_files
 
 SCENES = Path(__file__).parents[1] / "scenes"
 GARMENTS = ("basic_block", "dress", "princess_dress", "zip_skirt", "trousers")

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import importlib._bootstrap as bootstrap  # type: ignore[import-not-found,import-untyped,unused-ignore]
+import importlib.util
 import json
 import os
 import re
@@ -38,48 +39,48 @@ MOST_MEMORY = {"1000000": 2.5}  # [GB]
 
 # A part is the time in these functions, MODULE:NAME, less that in other parts which they call.
 PARTS = {
-    "reading": ("surface.io.read:read_surface", "scene.load:load_scene", "scene.load:make_scene"),
-    "reading, repair": ("surface.repair.validate:make_surface",),
-    "start of Warp": ("core.compile:start_warp", "cli.run:start_warp_silently"),
-    "mannequin and form": ("scene.form:scene_form", "scene.form_shaping:settle_shape"),
-    "checks before": ("scene.plan:plan_scene",),
-    "datum": ("flattening.datum:resolve_datum",),
-    "development": ("flattening.flatten_piece:develop_piece",),
-    "relaxation": ("flattening.flatten_piece:relax_developed", "garment.garment:flatten_form"),
-    "sewing": ("garment.sewing:sew",),
+    "reading": ("flat.surface.io.read:read_surface", "app.scene.load:load_scene", "app.scene.load:make_scene"),
+    "reading, repair": ("flat.surface.repair.validate:make_surface",),
+    "start of Warp": ("core.compile:start_warp", "app.cli.run:start_warp_silently"),
+    "mannequin and form": ("app.scene.form:scene_form", "app.scene.form_shaping:settle_shape"),
+    "checks before": ("app.scene.plan:plan_scene",),
+    "datum": ("flat.flattening.datum:resolve_datum",),
+    "development": ("flat.flattening.flatten_piece:develop_piece",),
+    "relaxation": ("flat.flattening.flatten_piece:relax_developed", "garment.construction.form_garment:flatten_form"),
+    "sewing": ("garment.construction.sewing:sew",),
     "checks after": (
-        "cutting.remedies:advise",
-        "garment.garment:Garment.advised",
-        "garment.girths:pattern_girths",
-        "surface.injective:overlap_area",
-        "flattening.result:layout_errors",
-        "model.fit:assess_fit",
-        "surface.energy_map:energy_report",
-        "flattening.fit_report:wear_measures",
+        "flat.cutting.remedies:advise",
+        "garment.construction.garment:Garment.advised",
+        "garment.construction.girths:pattern_girths",
+        "flat.surface.injective:overlap_area",
+        "flat.model.strain:layout_errors",
+        "flat.model.fit:assess_fit",
+        "flat.surface.energy_map:energy_report",
+        "flat.flattening.fit_report:wear_measures",
     ),
-    "film": ("scene.frames:Film.__enter__", "scene.frames:Film.__exit__", "scene.frames:FrameRecorder.__call__",
-             "scene.frames:FrameRecorder.record_result"),
-    "OBJ": ("export.obj:write_obj",),
-    "picture.png": ("export.picture:write_picture",),
-    "wear.png": ("export.fit_picture:write_wear_sheet",),
-    "walked.png": ("export.walked_picture:write_walked_picture",),
+    "film": ("app.scene.frames:Film.__enter__", "app.scene.frames:Film.__exit__", "app.scene.frames:FrameRecorder.__call__",
+             "app.scene.frames:FrameRecorder.record_result"),
+    "OBJ": ("pattern.export.obj:write_obj",),
+    "picture.png": ("pattern.export.picture:write_picture",),
+    "wear.png": ("pattern.export.fit_picture:write_wear_sheet",),
+    "walked.png": ("pattern.export.walked_picture:write_walked_picture",),
     "pattern, drafting": (
-        "garment.to_pattern:pattern_of_garment",
-        "garment.to_pattern:pattern_of_surface",
-        "pattern.draft:draft_garment",
-        "pattern.walked:walk_seams",
+        "garment.construction.to_pattern:pattern_of_garment",
+        "garment.construction.to_pattern:pattern_of_surface",
+        "pattern.drafting.draft:draft_garment",
+        "pattern.drafting.walked:walk_seams",
     ),
-    "pattern, DXF": ("export.dxf:write_dxf",),
-    "pattern, SVG": ("export.svg:write_svg",),
-    "pattern, PDF": ("export.pdf:write_pdf",),
-    "pattern, JSON": ("export.pattern_json:write_pattern_json",),
-    "marker": ("garment.pattern_files:_marker",),
-    "drape": ("scene.drape:write_drape",),
-    "film for the page": ("review.page:pack_frames",),
-    "review": ("review.page:write_review", "review.page:pack_pictures"),
+    "pattern, DXF": ("pattern.export.dxf:write_dxf",),
+    "pattern, SVG": ("pattern.export.svg:write_svg",),
+    "pattern, PDF": ("pattern.export.pdf:write_pdf",),
+    "pattern, JSON": ("pattern.export.pattern_json:write_pattern_json",),
+    "marker": ("pattern.export.pattern_files:_marker",),
+    "drape": ("app.scene.drape:write_drape",),
+    "film for the page": ("app.review.page:pack_frames",),
+    "review": ("app.review.page:write_review", "app.review.page:pack_pictures"),
     "metrics, hashes": ("core.output:remove_stale",),
     "waiting": ("core.beside:Beside.result",),
-    "report": ("cli.run:report_run",),
+    "report": ("app.cli.run:report_run",),
 }  # fmt: skip
 # The parts in order, with those that are measured by themselves.
 ORDER = ("start of Python", "imports", *PARTS, "rest", "end of process")
@@ -282,6 +283,9 @@ def main() -> None:
     parser.add_argument("--meshes", type=Path, metavar="FOLDER", help="keeps the written meshes for the next time")
     parser.add_argument("--json", type=Path, metavar="FILE", help="the same figures as data")
     given = parser.parse_args()
+    known = {function.partition(":")[0] for functions in PARTS.values() for function in functions}
+    if gone := [module for module in known if importlib.util.find_spec(f"warpflat.{module}") is None]:
+        raise SystemExit(f"PARTS names modules that there are no more: {', '.join(sorted(gone))}")
     wanted = given.only or [*NAMES, *map(str, SIZES)]
     results = {}
     with tempfile.TemporaryDirectory() as scratch:

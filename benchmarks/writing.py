@@ -26,7 +26,7 @@ from speed import CLOTH
 
 import warpflat
 from warpflat.flat.flattening.result import Flattening
-from warpflat.garment.construction.pattern_files import surface_files
+from warpflat.garment.construction.garment_files import surface_files
 
 SCENE = Path(__file__).parents[1] / "scenes" / "dome.toml"
 

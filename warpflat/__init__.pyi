@@ -48,13 +48,11 @@ from .flat import worn_strain as worn_strain
 from .garment import Correction as Correction
 from .garment import Drape as Drape
 from .garment import DrapeOptions as DrapeOptions
-from .garment import EdgeRules as EdgeRules
 from .garment import FixedLength as FixedLength
 from .garment import Form as Form
 from .garment import FormGarment as FormGarment
 from .garment import Garment as Garment
 from .garment import Mannequin as Mannequin
-from .garment import PatternOptions as PatternOptions
 from .garment import Placement as Placement
 from .garment import Recovery as Recovery
 from .garment import ScanOptions as ScanOptions
@@ -81,7 +79,9 @@ from .garment import size_names as size_names
 from .garment import surface_files as surface_files
 from .garment import write_mannequin as write_mannequin
 from .pattern import Cloth as Cloth
+from .pattern import EdgeRules as EdgeRules
 from .pattern import FrameWriter as FrameWriter
+from .pattern import PatternOptions as PatternOptions
 from .pattern import draft_garment as draft_garment
 from .pattern import make_marker as make_marker
 from .pattern import plot as plot

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -92,6 +93,31 @@ def test_a_function_whose_process_dies_runs_again():
 
     with work_beside(), Beside(die) as work:
         assert work.result() == "done"
+
+
+def test_what_the_caller_has_dropped_is_not_collected_by_another_process():
+    """Its end may wait for a thread of the caller, as that of a Dask client does."""
+    collected = list[int]()
+
+    class Dropped:
+        def __init__(self) -> None:
+            self.itself = self
+
+        def __del__(self) -> None:
+            collected.append(os.getpid())
+
+    def collect() -> list[int]:
+        gc.collect()
+        return collected
+
+    gc.disable()
+    try:
+        Dropped()
+        with work_beside(), Beside(collect) as work:
+            assert work.result() == []
+    finally:
+        gc.enable()
+    assert collect() == [os.getpid()]
 
 
 def test_a_process_ends_with_its_block():

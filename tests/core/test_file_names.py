@@ -17,8 +17,8 @@ from warpflat.core.file_names import check_file_name, make_file_name
 from warpflat.flat.surface.io.read import read_surface
 from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.flat.surface.shapes import make_shape
-from warpflat.garment.construction.pattern_files import export_patterns
 from warpflat.garment.mannequin.forms import form_from_mapping
+from warpflat.pattern.export.pattern_files import export_patterns
 
 BAD = {
     "": "it is empty",

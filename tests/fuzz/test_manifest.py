@@ -15,7 +15,7 @@ from warpflat.core.errors import CannotWriteError, InputError
 from warpflat.core.output import remove_stale
 from warpflat.flat.flattening.flatten_piece import flatten
 from warpflat.flat.surface.shapes import make_shape
-from warpflat.garment.construction.pattern_files import export_patterns
+from warpflat.pattern.export.pattern_files import export_patterns
 from warpflat.pattern.export.piece_files import save_piece
 
 PATTERN = {"cap.dxf", "cap.svg", "pattern.pdf", "pattern.json"}
@@ -124,7 +124,7 @@ def test_nothing_is_removed_by_a_run_that_fails(tmp_path: Path, monkeypatch: pyt
     def full(*_: object, **__: object) -> None:
         raise CannotWriteError("cannot write: no space left on device")
 
-    monkeypatch.setattr("warpflat.garment.construction.pattern_files._write", full)
+    monkeypatch.setattr("warpflat.pattern.export.pattern_files._write", full)
     with pytest.raises(InputError, match="no space"):
         run(tmp_path, shape="bodice", formats=("pdf",))
     assert files(tmp_path) == before

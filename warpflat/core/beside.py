@@ -6,6 +6,7 @@ Everywhere else, and where there is one core, a function runs when its result is
 
 from __future__ import annotations
 
+import gc
 import os
 import pickle
 import signal
@@ -136,6 +137,8 @@ def two_at_a_time(function: Callable[[Item], Result], items: Iterable[Item]) -> 
 
 def _answer_in_child(function: Callable[[], Any], answer: Any, parent: int) -> None:
     """Send whether a function went well, its result or error, and what it has read and left out; end the process, whatever happens."""
+    # What the parent has dropped is not collected here: the end of a Dask client waits for a thread, which a fork lacks.
+    gc.freeze()
     import ctypes
 
     try:

@@ -19,7 +19,8 @@ from warpflat.app.scene.plan import plan_garment
 from warpflat.app.scene.run import run_scene
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, polyline_length
-from warpflat.garment.construction.pattern_files import PatternOptions, garment_files
+from warpflat.garment.construction.garment_files import garment_files
+from warpflat.pattern.export.pattern_files import PatternOptions
 from warpflat.pattern.export.pattern_json import read_pattern_json
 
 BODICE = {"form": "bodice", "mannequin": {"size": "EU 38", "resolution_mm": 40}}

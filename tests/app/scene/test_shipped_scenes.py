@@ -27,7 +27,6 @@ from warpflat.core.text import other_side
 from warpflat.core.toml_file import read_toml
 from warpflat.flat.fabric.library import load_library
 from warpflat.garment.construction.linings import add_interfacing, add_lining
-from warpflat.garment.construction.pattern_files import export_patterns
 from warpflat.garment.construction.to_pattern import pattern_of_garment
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.drafted import DraftedGarment
@@ -38,6 +37,7 @@ from warpflat.pattern.drafting.pieces import SeamSide
 from warpflat.pattern.drafting.sewing_order import notions, sewing_steps, sewn_seams, tools
 from warpflat.pattern.drafting.sewing_tasks import techniques
 from warpflat.pattern.drafting.words import language_words, printed_in
+from warpflat.pattern.export.pattern_files import export_patterns
 from warpflat.pattern.export.pattern_json import read_pattern_json
 
 if sys.version_info >= (3, 11):

@@ -17,7 +17,6 @@ from warpflat.flat.solver.options import RelaxOptions
 from warpflat.flat.solver.steps import Relaxation
 from warpflat.flat.surface.shapes import make_shape
 from warpflat.garment.construction.ease import SeamWish, cap_wishes, seam_ratios
-from warpflat.garment.construction.edge_rules import EdgeRules
 from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.fullness import FullEdge, give_fullness, measure_fullness
 from warpflat.garment.construction.garment import Garment
@@ -25,6 +24,7 @@ from warpflat.garment.construction.to_pattern import pattern_of_garment
 from warpflat.garment.mannequin.forms import FormResult, PieceRecipe, shipped_form
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.pattern.drafting.draft import draft_garment
+from warpflat.pattern.drafting.edge_rules import EdgeRules
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,6 @@ from warpflat.flat.cutting.separate_pieces import separate
 from warpflat.flat.flattening.flatten_piece import flatten
 from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.flat.surface.shapes import make_shape
-from warpflat.garment.construction.edge_rules import EdgeRules
 from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.form_plan import plan_form
 from warpflat.garment.construction.garment import Garment
@@ -24,6 +23,7 @@ from warpflat.garment.construction.to_pattern import pattern_of_garment, pattern
 from warpflat.garment.mannequin.forms import form_from_mapping
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.pattern.drafting.draft import draft_garment
+from warpflat.pattern.drafting.edge_rules import EdgeRules
 
 FORMS = ("basic_block", "tshirt", "dress", "princess_dress", "a_line_skirt")
 SIZES = ("EU 36", "EU 38", "EU 40", "EU 44")

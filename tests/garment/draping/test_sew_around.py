@@ -113,7 +113,9 @@ def test_a_shirt_is_sewn_by_its_seams_alone():
     check_sewn(worn.cloth, worn.positions - [0.0, 0.0, 0.03], [], [], lines)
     wide = worn.positions * [2.5, 1.0, 2.5]
     check_sewn(worn.cloth, wide, [], [], {"left leg": lines["left leg"]})
-    with pytest.raises(InputError, match=r"piece '.': the left arm .* stretched by over 100 %.* too small for this body"):
+    with pytest.raises(
+        InputError, match=r"piece '.': the left arm .* stretched by over 100 %.* too small for this body"
+    ):
         check_sewn(worn.cloth, wide, [], [], {"left arm": lines["left arm"]})
     # Every other vertex on the other side.
     crumpled = worn.positions.copy()

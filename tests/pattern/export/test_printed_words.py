@@ -13,7 +13,6 @@ from pypdf import PdfReader
 from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
-from warpflat.garment.construction.pattern_files import check_names
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.drawing import draw_piece
@@ -24,6 +23,7 @@ from warpflat.pattern.drafting.pieces import Pattern, Piece
 from warpflat.pattern.drafting.sewing_order import sewing_steps
 from warpflat.pattern.drafting.worn import Measure, NeededOpening, ViewedPiece, Worn
 from warpflat.pattern.export.dxf import write_dxf
+from warpflat.pattern.export.pattern_files import check_names
 from warpflat.pattern.export.pattern_json import pattern_from_json, pattern_json
 from warpflat.pattern.export.pdf import write_pdf
 from warpflat.pattern.export.svg import write_svg

@@ -75,7 +75,7 @@ def export(
       warpflat export bought.dxf --format pdf --units in
       warpflat export drawing.svg --format dxf --allowance 10
     """
-    from warpflat.garment import export_patterns
+    from warpflat.pattern import export_patterns
 
     files, notes = export_patterns(
         source,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from warpflat.app.cli.options import DONE, NOT_CONVERGED, ComputingCommand, tell
+from warpflat.app.cli.options import DONE, FAULTY, ComputingCommand, tell
 
 __all__ = ["marker"]
 
@@ -117,8 +117,7 @@ def marker(
       warpflat marker drawing.svg --one-way --seconds 60
     """
     from warpflat.core import InputError
-    from warpflat.garment import lay_markers
-    from warpflat.pattern import Cloth, Stripes
+    from warpflat.pattern import Cloth, Stripes, lay_markers
 
     if seams and not (repeat_warp or repeat_weft):
         raise InputError("--match: needs the repeat of the stripes, --repeat-warp MM or --repeat-weft MM")
@@ -146,4 +145,4 @@ def marker(
         for note in notes:
             tell(note)
         click.echo(f"{files[0].parent}: {', '.join(file.name for file in files)}")
-    return NOT_CONVERGED if any("not_made" in plan for plan in plans) else DONE
+    return FAULTY if any("not_made" in plan for plan in plans) else DONE

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from warpflat.app.scene.load import Scene, errors_named
 from warpflat.app.scene.schema import DrapeTable
 from warpflat.core import report_activity
-from warpflat.garment import Garment, garment_files, pattern_names
+from warpflat.garment import Garment, garment_files
+from warpflat.pattern import pattern_names
 
 if TYPE_CHECKING:
     from warpflat.flat import Flattening

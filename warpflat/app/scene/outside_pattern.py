@@ -365,14 +365,13 @@ def drape_outside(
     from warpflat.core import optional_file, output_folder, remove_stale, report_activity
     from warpflat.flat import run_metrics
     from warpflat.garment import (
-        PatternOptions,
         Placement,
         drape_pattern,
         moved_outlines,
-        outline_files,
         relieve_pattern,
         write_drape_files,
     )
+    from warpflat.pattern import PatternOptions, write_pattern
 
     table, pattern = job.sewing.drape, job.pattern
     cloth, notes = _fabric(job, fabric)
@@ -406,7 +405,7 @@ def drape_outside(
             chosen = pattern.sample if size is None else size
             moved = moved_outlines(pattern, chosen, found.before.cloth, found.after.cloth)
             drawing = PatternOptions(formats=("dxf", "svg"))
-            written = outline_files(moved, folder, name=f"{job.name}.corrected", options=drawing)
+            written = write_pattern(lambda: (moved, ()), folder, name=f"{job.name}.corrected", options=drawing)
             files += written.files
             more = [*more, *written.notes, _correction_words(found)]
         files.append("metrics.json")

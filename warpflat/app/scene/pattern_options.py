@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from warpflat.garment import EdgeRules
-
 if TYPE_CHECKING:
     from warpflat.app.scene.schema import ClothTable, MarkerTable, PatternTable
-from warpflat.garment import PatternOptions
-from warpflat.pattern import Shrinkage, language_words
+from warpflat.pattern import EdgeRules, PatternOptions, Shrinkage, language_words
 
 __all__ = ["pattern_options"]
 

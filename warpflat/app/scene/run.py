@@ -36,11 +36,9 @@ from warpflat.garment import (
     FormResult,
     Garment,
     Mannequin,
-    WrittenPattern,
     garment_files,
-    pattern_names,
 )
-from warpflat.pattern import note_on_names
+from warpflat.pattern import WrittenPattern, note_on_names, pattern_names
 
 if TYPE_CHECKING:
     from warpflat.pattern import DraftedOutline
@@ -80,7 +78,7 @@ def run_scene(
     """Flatten the scene's surface, all pieces of its file, or the pieces of its form, and write the result.
 
     Files: `metrics.json`, `NAME.obj` per piece, `frames.usdc`, `picture.png`, and the pattern (see
-    `warpflat.garment.construction.pattern_files`). Files that an earlier run has left there and this one does not make are removed at the
+    `warpflat.pattern.export.pattern_files`). Files that an earlier run has left there and this one does not make are removed at the
     end (see `warpflat.core.output`). All of that happens together; a run that fails leaves the folder
     as it was, and no run replaces a file that it has read.
 

@@ -15,11 +15,12 @@ import numpy as np
 
 from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest, project_on_segments
 from warpflat.flat import Surface, border_loops
+from warpflat.garment.construction.sewn import Stitching
 
-__all__ = ["BorderSeam", "SurfaceSeam", "surface_seams"]
+__all__ = ["ONE_CURVE", "BorderSeam", "surface_seams"]
 
-#: Sides that keep this near [m] to each other in space are one curve.
-_SHARED = 1e-3
+#: Borders that keep this near [m] to each other in space are one curve.
+ONE_CURVE = 1e-3
 #: Other sides differ in length by no more than these shares: any, and those with as many vertices.
 _ALIKE, _AS_MANY = 0.01, 0.05
 #: Vertices that agree in their share of the length within this part of an edge are sewn edge by edge.
@@ -50,23 +51,8 @@ class BorderSeam:
         return self.factor - 1.0 if self.longer == 1 else 1.0 / self.factor - 1.0
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SurfaceSeam:
-    """A named seam on a mesh.
-
-    Attributes:
-        named: the wish.
-        vertices: of both sides, in corresponding order.
-        joints: #J by 2, positions in the two rows that are sewn to each other; None if all are, one to one.
-    """
-
-    named: BorderSeam
-    vertices: tuple[IntArray, IntArray]
-    joints: IntArray | None
-
-
-def surface_seams(surface: Surface, named: Sequence[BorderSeam]) -> tuple[SurfaceSeam, ...]:
-    """Find named seams on a surface.
+def surface_seams(surface: Surface, named: Sequence[BorderSeam]) -> list[Stitching]:
+    """Return the seams that are named on a surface, in their order, as they are to be sewn.
 
     Args:
         surface: whole or cut, with the lines that the seams name.
@@ -76,8 +62,6 @@ def surface_seams(surface: Surface, named: Sequence[BorderSeam]) -> tuple[Surfac
         InputError: a line is unknown (names the nearest), closed, parted by a cut or not on the border, or the two do not
             fit: they share no curve in space and differ in length.
     """
-    if not named:
-        return ()
     loops = border_loops(surface.faces)
     along = {edge for loop in loops for edge in pairwise([*loop.tolist(), int(loop[0])])}
     found = []
@@ -92,7 +76,7 @@ def surface_seams(surface: Surface, named: Sequence[BorderSeam]) -> tuple[Surfac
             one, other = surface.vertices[first], surface.vertices[second]
             # Two stretches of one border meet running against each other.
             second, other = second[::-1].copy(), other[::-1]
-            shared = max(_largest_distance(one, other), _largest_distance(other, one)) <= _SHARED
+            shared = max(_largest_distance(one, other), _largest_distance(other, one)) <= ONE_CURVE
             if shared and np.linalg.norm(one[0] - other[-1]) < np.linalg.norm(one[0] - other[0]):
                 raise InputError(
                     f"{seam.sides[0]!r} and {seam.sides[1]!r} lie on each other the same way round, face to back; sides meet face to face"
@@ -106,13 +90,15 @@ def surface_seams(surface: Surface, named: Sequence[BorderSeam]) -> tuple[Surfac
                     f"not one curve in space; sides agree within {_ALIKE:.0%}, or {_AS_MANY:.0%} with as many vertices each"
                 )
             found.append(
-                SurfaceSeam(
-                    named=seam, vertices=(first, second), joints=_joints(arcs[0] / lengths[0], arcs[1] / lengths[1])
+                Stitching(
+                    name=seam.name, pieces=(surface.name, surface.name), vertices=(first, second), ratio=1.0 / (1.0 + seam.ease),
+                    joints=_joints(arcs[0] / lengths[0], arcs[1] / lengths[1]),
+                    sides=(f"{surface.name}.{seam.sides[0]}", f"{surface.name}.{seam.sides[1]}"),
                 )
-            )
+            )  # fmt: skip
         except InputError as error:
             raise InputError(f"seam {seam.name!r}: {error}") from None
-    return tuple(found)
+    return found
 
 
 def _side(surface: Surface, along: set[tuple[int, int]], line: str) -> IntArray:

@@ -65,7 +65,7 @@ ON, ON_EDGE = 1e-6, 1e-3
 SHORT = 1e-3
 #: Lines that differ by no more [m] are one.
 SAME_LINE = 5e-5
-#: What differs by less than this [m] from the mirror image of its partner is cut by one pattern.
+#: What differs by less than this [m] from the mirror image of its partner becomes that exactly, and is cut by one pattern.
 SAME_PIECE = 5e-4
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from warpflat.core import BoolArray, FloatArray, format_count
 from warpflat.flat import RawMesh, following_corners, join_labels, weld_map
 
-__all__ = ["FILE_SEAMS", "MOST_ISLANDS", "FileSeams", "file_seams", "like_cut_pieces"]
+__all__ = ["COUNTED", "FILE_SEAMS", "MOST_ISLANDS", "FileSeams", "file_seams", "like_cut_pieces"]
 
 Ids = NDArray[np.int64]
 
@@ -26,9 +26,10 @@ FILE_SEAMS = ("uv", "materials", "groups")
 MOST_ISLANDS = 200
 # Islands of fewer than this share of their part's area are joined to the neighbour along most of their outline.
 _CRUMB = 1e-3
-# Cut pieces: at most so many; areas that agree with the cloth's within this share, of islands above the second share of their part;
-# and no more of an island than this lies face down.
-_MOST_PIECES, _SAME_AREA, _COUNTED, _FACE_DOWN = 24, 0.15, 0.01, 0.01
+#: The area of an island of the texture counts if it is more than this share of the cloth's.
+COUNTED = 0.01
+# Cut pieces: at most so many; areas that agree with the cloth's within this share; and no more of an island than this lies face down.
+_MOST_PIECES, _SAME_AREA, _FACE_DOWN = 24, 0.15, 0.01
 # Slits are one seam across a gap of this share of both, from which they turn by no more than this (its cosine).
 _GAP, _IN_LINE = 0.25, float(np.cos(np.radians(30.0)))
 # A part that is mirrored in the texture is an island of its own from this share on.
@@ -134,7 +135,7 @@ def like_cut_pieces(raw: RawMesh, seams: FileSeams) -> str:
         for island in np.unique(seams.island[whole]).tolist():
             own = seams.island == island
             area = float(sides.area[own].sum())
-            if area < _COUNTED * sides.area.sum():
+            if area < COUNTED * sides.area.sum():
                 continue
             ratio = float(np.abs(flat[own]).sum()) / max(area * scale, 1e-300)
             if not abs(ratio - 1.0) <= _SAME_AREA:

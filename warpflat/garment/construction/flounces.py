@@ -18,8 +18,8 @@ from warpflat.garment.construction.edges import (
 )
 from warpflat.garment.construction.facings import centre_notch
 from warpflat.garment.construction.free_edges import FreeChain, chain_allowance, chain_length
-from warpflat.garment.construction.strips import CLOTH_WIDTH, NARROW, Strip, panel_count, strip_edges, swept
-from warpflat.pattern import Edge, Pattern, Piece, SeamSide
+from warpflat.garment.construction.strips import NARROW, Strip, panel_count, strip_edges, swept
+from warpflat.pattern import CLOTH_WIDTH, Edge, Pattern, Piece, SeamSide
 
 __all__ = ["with_flounce"]
 

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.core import InputError, find_unused_name, nearest
-from warpflat.garment.construction.edge_rules import EdgeRules
-from warpflat.pattern import HEMMED_LEVELS, Seam, SeamSide
+from warpflat.pattern import HEMMED_LEVELS, EdgeRules, Seam, SeamSide
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.forms import FormResult

@@ -10,11 +10,9 @@ import numpy as np
 
 from warpflat.core import FloatArray, InputError, IntArray, reflected
 from warpflat.flat import SAME_PLACE, Surface, half_edges, join_labels
+from warpflat.garment.construction.edges import SAME_PIECE
 
 __all__ = ["even_sides", "match_images", "mirror_images", "mirror_partners", "mirror_plane"]
-
-#: Layouts of which one is the other's mirror image within this [m] become so exactly.
-NEARLY = 5e-4
 
 
 def mirror_partners(faces: IntArray, axis: IntArray, *, vertex_count: int) -> IntArray:
@@ -166,6 +164,6 @@ def even_sides(layouts: Mapping[str, FloatArray], images: Mapping[str, tuple[str
     for name, (mate, partners) in images.items():
         own, other = layouts[name], layouts[mate][partners] * [-1.0, 1.0]
         other = other + own.mean(axis=0) - other.mean(axis=0)
-        if np.abs(own - other).max() < NEARLY:
+        if np.abs(own - other).max() < SAME_PIECE:
             made[name] = 0.5 * (own + other)
     return made if made.keys() == layouts.keys() else dict(layouts)

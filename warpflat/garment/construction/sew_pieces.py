@@ -12,7 +12,7 @@ import numpy as np
 
 from warpflat.core import BoolArray, InputError, IntArray, arc_lengths, find_unused_name
 from warpflat.flat import SAME_PLACE, Flattening, Layer, RelaxOptions, Surface, border_loops, join_labels, lies_within
-from warpflat.garment.construction.border_seams import BorderSeam, surface_seams
+from warpflat.garment.construction.border_seams import ONE_CURVE, BorderSeam, surface_seams
 from warpflat.garment.construction.closed_cuts import seams_of_cuts
 from warpflat.garment.construction.constraints import Constraint, KeptGirth
 from warpflat.garment.construction.fullness import FullEdge, give_fullness
@@ -28,10 +28,8 @@ __all__ = ["Bands", "meeting_borders", "name_seams", "sew_pieces", "unsewn_borde
 #: Which bands are cut straight.
 Bands = Literal["auto", "straight", "as worn"]
 
-#: Borders that run along each other within this distance [m] are meant to be sewn, or reported.
-BESIDE = 1e-3
-# Of a piece that is sewn to no other, borders that run along another piece within this distance [m] are reported, too; the cosine
-# of the way there and the border is less than the second.
+# A layer that keeps this near [m] to another one is its lining. Borders of a piece that is sewn to no other are reported where another
+# piece is as near, too; the cosine of the way there and the border is less than the second.
 _NEARLY, _AHEAD = 5e-3, 0.7
 # Of one border only places further apart along it than this [m] can be beside each other; shorter stretches than the second are corners.
 _APART, _SHORTEST = 1e-2, 3e-3
@@ -41,8 +39,6 @@ _MOST_TOLD = 20
 _SAMPLES, _MOST_SAMPLES = 5e-4, 200_000
 # Layouts of mirrored pieces that differ by less than this [m] are two roundings of one.
 _ALIKE = 5e-3
-# A layer that keeps within this distance [m] of another one is its lining.
-_LINING = 5e-3
 # A band that its mesh says is straight is so many times as long as wide, and this share of one side is sewn, and not of the other.
 _SLENDER, _SEWN = 15.0, 0.8
 
@@ -88,14 +84,14 @@ def sew_pieces(
     first = next(iter(flat))
     found = surface_seams(flat[first].network.surface, seams)
     # More cloth along the sides that are meant to be longer.
-    longer = [(seam, seam.vertices[seam.named.longer]) for seam in found if seam.named.factor > 1.0]
+    longer = [(seam, pair.vertices[seam.longer]) for seam, pair in zip(seams, found, strict=True) if seam.factor > 1.0]
     if longer and flat[first].cuts:
         raise InputError(
-            f"seam {longer[0][0].named.name!r}: fullness and gathers need a piece that is not cut; leave out the cuts or the fullness"
+            f"seam {longer[0][0].name!r}: fullness and gathers need a piece that is not cut; leave out the cuts or the fullness"
         )
     if longer:
-        full = [FullEdge(vertices=row, factor=seam.named.factor, gathered=seam.named.gathered) for seam, row in longer]
-        rows = [row for seam in found for row in seam.vertices]
+        full = [FullEdge(vertices=row, factor=seam.factor, gathered=seam.gathered) for seam, row in longer]
+        rows = [row for pair in found for row in pair.vertices]
         flat[first] = give_fullness(flat[first], full, rows, options=options)
     pairs = [
         Stitching(
@@ -105,13 +101,7 @@ def sew_pieces(
         for name, piece in flat.items()
         for title, _, seam in seams_of_cuts(piece)
     ]  # fmt: skip
-    pairs += [
-        Stitching(
-            name=seam.named.name, pieces=(first, first), vertices=seam.vertices, ratio=1.0 / (1.0 + seam.named.ease),
-            joints=seam.joints, sides=(f"{first}.{seam.named.sides[0]}", f"{first}.{seam.named.sides[1]}"),
-        )
-        for seam in found
-    ]  # fmt: skip
+    pairs += found
     borders = {name: piece.network.surface for name, piece in flat.items()}
     for pair in meeting_borders(borders, without=_sewn_edges(pairs)):
         if len(flat) > 1:
@@ -323,7 +313,9 @@ def unsewn_borders(
     points = start[of] + share[:, None] * edge[of]
     loop, piece = edges.loop[free][of], edges.piece[free][of]
     arc, around = edges.arc[free][of] + share * length[of], edges.around[free][of]
-    here, there = cKDTree(points).query_pairs((_NEARLY if alone else BESIDE) + 0.5 * spacing, output_type="ndarray").T
+    here, there = (
+        cKDTree(points).query_pairs((_NEARLY if alone else ONE_CURVE) + 0.5 * spacing, output_type="ndarray").T
+    )
     apart = np.abs(arc[here] - arc[there])
     other = (loop[here] != loop[there]) | (np.minimum(apart, around[here] - apart) > _APART)
     # Both borders see each other: the first tells it.
@@ -340,7 +332,7 @@ def unsewn_borders(
     way = edge[of[here]] / np.maximum(length[of[here]], np.finfo(float).tiny)[:, None]
     beside = np.abs(((to - foot[:, None] * along) * way).sum(axis=1)) < _AHEAD * gap
     nearly = (by_itself[here] | by_itself[there]) & (piece[here] != piece[there]) & beside
-    order = order[gap[order] <= np.where(nearly, _NEARLY, BESIDE)[order]]
+    order = order[gap[order] <= np.where(nearly, _NEARLY, ONE_CURVE)[order]]
     if len(order) == 0:
         return []
     order = order[np.append(True, np.diff(here[order]) > 0)]
@@ -360,7 +352,7 @@ def unsewn_borders(
             farthest = float(np.quantile(gap[run], 0.9))
             why = (
                 "only two borders that agree vertex by vertex are, and no lining to its outer layer all around"
-                if farthest <= BESIDE
+                if farthest <= ONE_CURVE
                 else f"surface.meet_mm (--meet) {np.ceil(1e3 * farthest + 0.5):.0f} makes them meet"
             )
             place = ", ".join(f"{100 * x:.0f}" for x in points[here[run[len(run) // 2]]] + 0.0)
@@ -412,7 +404,7 @@ class _BorderEdges:
             if len(met) > 1 or other in ("", name):
                 continue
             inner, outer = (Layer(surfaces[key].vertices, surfaces[key].faces) for key in (name, other))
-            if lies_within(inner, outer, _LINING):
+            if lies_within(inner, outer, _NEARLY):
                 self._partner = {
                     a: b for a, b in self._partner.items() if {self.names[a], self.names[b]} != {name, other}
                 }

@@ -22,12 +22,12 @@ from warpflat.flat import (
     read_mesh_file,
     triangulate,
 )
-from warpflat.garment import MOST_ISLANDS, file_seams
+from warpflat.garment.construction.file_seams import COUNTED, MOST_ISLANDS, file_seams
 
 __all__ = ["SewnPanel", "mesh_area", "read_sewn_panels", "sewn_panels", "with_cuts"]
 
-# How far the area of the texture may differ from the cloth's, in all and for a panel that is more than the second share of it.
-_TRUE_SIZE, _COUNTED = 0.25, 0.01
+# How far the area of the texture may differ from the cloth's, in all and for a panel that counts.
+_TRUE_SIZE = 0.25
 # No place of a texture lies farther out, in its own unit.
 _FARTHEST = 1e6
 # Panels may cover so much of each other, or of themselves.
@@ -169,7 +169,7 @@ def sewn_panels(raw: RawMesh, scale: float, *, name: str = "panel") -> list[Sewn
     metres = METRES_PER_UNIT[unit]
     ratio = metres**2 * flat / worn_area
     each = metres**2 * areas[:, 0] / np.maximum(areas[:, 1], 1e-300)
-    counted = areas[:, 1] > _COUNTED * worn_area
+    counted = areas[:, 1] > COUNTED * worn_area
     if not (abs(ratio - 1.0) <= _TRUE_SIZE and (np.abs(each[counted] - 1.0) <= _TRUE_SIZE).all()):
         raise InputError(
             f"its texture is no pattern of true size: in {unit}, the nearest unit, it has {ratio:.2f} times the area of the cloth, single "

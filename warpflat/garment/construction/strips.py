@@ -12,10 +12,8 @@ from warpflat.core import FloatArray, InputError, part_between, polyline_length
 from warpflat.garment.construction.edges import bezier, joined, new_piece
 from warpflat.pattern import Edge, Piece, drawn_length
 
-__all__ = ["CLOTH_WIDTH", "NARROW", "Strip", "folded_strip", "panel_count", "strip_edges", "swept"]
+__all__ = ["NARROW", "Strip", "folded_strip", "panel_count", "strip_edges", "swept"]
 
-#: Usable width of the cloth [m], if nobody says another one: what is left of a cloth of 1.45 m between its selvedges.
-CLOTH_WIDTH = 1.40
 
 #: Allowance of an edge that is turned in or overlocked, and of a narrow hem [m].
 NARROW = 0.010

@@ -42,7 +42,6 @@ from warpflat.flat import (
 from warpflat.garment.construction.closed_cuts import CLOSED, are_closed, close_cuts, seams_of_cuts
 from warpflat.garment.construction.darts import pleat_depths
 from warpflat.garment.construction.ease import measure_ease
-from warpflat.garment.construction.edge_rules import EdgeRules
 from warpflat.garment.construction.edges import SHORT, lengths_of, with_pieces
 from warpflat.garment.construction.equal_pieces import draw_equal_pieces_once
 from warpflat.garment.construction.facings import STAND, Stand
@@ -55,14 +54,15 @@ from warpflat.garment.construction.mark_openings import mark_openings
 from warpflat.garment.construction.mirror_pieces import draw_pairs_once
 from warpflat.garment.construction.openings import one_sided, place_opening
 from warpflat.garment.construction.pockets import add_pockets
-from warpflat.garment.construction.strips import CLOTH_WIDTH
 from warpflat.garment.mannequin.seam_names import name_seams
 from warpflat.pattern import (
+    CLOTH_WIDTH,
     DEFAULT_ALLOWANCE,
     FOLD_STRAIGHT,
     SEAM_TOLERANCE,
     Dart,
     Edge,
+    EdgeRules,
     Hole,
     MeshFeatures,
     Pattern,
@@ -174,16 +174,13 @@ def pattern_of_garment(
         if opening.opens_the_top
     ]
     stands = [
-        Stand(
-            piece=piece.name, edge=edge.name, width=opening.buttons.facing_width,
-            grown_on=opening.buttons.facing == "grown-on",
-        )
+        Stand(piece=piece.name, edge=edge.name, width=opening.facing_width, grown_on=opening.facing != "separate")
         for opening in sample.openings
-        if opening.buttons is not None
+        if opening.kind == "buttons"
         for piece in pattern.pieces[pattern.sample]
         for edge in piece.edges
-        if edge.name == f"{opening.line} {STAND}"
-    ]  # fmt: skip
+        if edge.name == f"{opening.seam} {STAND}"
+    ]
     rises = hem_rises(pattern, sample.finishing)
     with optional_step("the pattern has no finishing"):
         girths = {size: garment.body_girths for size, garment in laid.items()}

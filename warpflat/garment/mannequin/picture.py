@@ -20,11 +20,11 @@ from warpflat.pattern import (
     Pen,
     Scale,
     View,
-    draw_row,
     drawn_page,
     make_facets,
     space_out,
-    view_from_side,
+    views_around,
+    write_maps,
 )
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["body_views", "signed_distances", "write_distance_picture", "write_mannequin_picture"]
 
 _VIEWS = (("front", 0.0), ("three-quarter", 38.0), ("left side", 90.0), ("back", 180.0))
-_HEIGHT, _GAP = 8.0, 0.2  # of the page, and between views [in]
+_HEIGHT = 8.0  # of the page [in]
 _LINE, _LEADER = "#9c1f30", (*INK, 0.65)
 # A line is not drawn where it turns from the eye: there it slips along the outline.
 _FACING = 0.12
@@ -44,7 +44,7 @@ _SCALE = 15.0
 def body_views(mannequin: Mannequin, sides: Iterable[tuple[str, float]]) -> dict[str, View]:
     """Return views of a mannequin without its mesh by title, from some sides [degrees]."""
     facets = make_facets(mannequin.layout.body_faces, np.empty((0, 2), dtype=np.int32))
-    return {title: view_from_side(mannequin.vertices, facets, degrees) for title, degrees in sides}
+    return views_around(mannequin.vertices, facets, sides)
 
 
 def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) -> None:
@@ -151,14 +151,6 @@ def write_distance_picture(mannequin: Mannequin, path: str | os.PathLike[str]) -
     """
     distance = 1000.0 * signed_distances(mannequin)
     scale, far = Scale(low=-_SCALE, high=_SCALE, colours="RdBu"), np.abs(distance)
-    views = body_views(mannequin, SIDES)
-    inches = _HEIGHT * 0.82 / float(views["front"].size[1])
-    with drawn_page(path, inches * sum(float(view.size[0]) for view in views.values()) + 3 * _GAP, _HEIGHT) as pen:
-        colours, left = [scale.rgb(distance)] * len(views), 0.5 * _GAP
-        draw_row(pen, views, colours, left=left, bottom=0.11 * _HEIGHT, inches_per_metre=inches, gap=_GAP)
-        bar = pen.colour_bar(scale, 0.25 * pen.width, 0.055 * _HEIGHT, 0.5 * pen.width, 0.018 * _HEIGHT)
-        bar.set_label(
-            f"mannequin inside (-) or outside (+) the scan [mm]; half of it within {np.median(far):.1f} mm, 95 % within "
-            f"{np.quantile(far, 0.95):.1f} mm", fontsize=9,
-        )  # fmt: skip
-        pen.write(0.5 * pen.width, 0.98 * _HEIGHT, f"Distance to the {mannequin.source}", 11, ha="center")
+    near = f"half of it within {np.median(far):.1f} mm, 95 % within {np.quantile(far, 0.95):.1f} mm"
+    map_of = {f"mannequin inside (-) or outside (+) the scan [mm]; {near}": (scale, [scale.rgb(distance)] * len(SIDES))}
+    write_maps(path, f"Distance to the {mannequin.source}", body_views(mannequin, SIDES), map_of, tallest=_HEIGHT)

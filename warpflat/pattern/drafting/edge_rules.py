@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from warpflat.core import InputError, nearest
-from warpflat.pattern import DEFAULT_ALLOWANCE, EDGE_KINDS
+from warpflat.pattern.drafting.piece_parts import DEFAULT_ALLOWANCE, EDGE_KINDS
 
 __all__ = ["EdgeRules"]
 

@@ -27,31 +27,29 @@ from warpflat.core import (
     write_json,
     write_report,
 )
-from warpflat.garment.construction.edge_rules import EdgeRules
-from warpflat.garment.construction.form_garment import FormGarment
-from warpflat.garment.construction.linings import add_interfacing, add_lining, add_pocketing
-from warpflat.garment.construction.strips import CLOTH_WIDTH
-from warpflat.pattern import Shrinkage, enlarged
+from warpflat.pattern.drafting.edge_rules import EdgeRules
+from warpflat.pattern.drafting.shrinkage import Shrinkage, enlarged
 
 if TYPE_CHECKING:
-    from warpflat.flat import Flattening
-    from warpflat.garment.construction.border_seams import BorderSeam
-    from warpflat.garment.construction.garment import Garment
-    from warpflat.pattern import Cloth, DraftedGarment, FoundSeam, Pattern, WalkedSeam
+    from warpflat.pattern.drafting.drafted import DraftedGarment
+    from warpflat.pattern.drafting.marker import Cloth
+    from warpflat.pattern.drafting.pieces import Pattern
+    from warpflat.pattern.drafting.walked import WalkedSeam
 
 __all__ = [
+    "CLOTH_WIDTH",
     "FORMATS",
     "PatternOptions",
     "WrittenPattern",
     "check_names",
     "export_patterns",
-    "garment_files",
     "lay_markers",
-    "outline_files",
     "pattern_names",
-    "surface_files",
+    "write_pattern",
 ]
 
+#: Usable width of the cloth [m], if nobody says another one: what is left of a cloth of 1.45 m between its selvedges.
+CLOTH_WIDTH = 1.40
 #: The formats, and the names of their files; the first four are written if nothing is said.
 FORMATS = {
     "dxf": "{}.dxf",
@@ -126,85 +124,6 @@ class WrittenPattern:
     notes: tuple[str, ...] = ()
     metrics: Mapping[str, Any] = field(default_factory=dict)
     walked: tuple[WalkedSeam, ...] = ()
-
-
-def garment_files(
-    garments: Mapping[str, Garment],
-    folder: str | Path,
-    *,
-    name: str,
-    options: PatternOptions | None = None,
-    sample_size: str | None = None,
-    found_seams: Sequence[FoundSeam] = (),
-) -> WrittenPattern:
-    """Write the pattern of a garment; on a form in one or more sizes, of which several lie upon each other as a nest.
-
-    A pattern that cannot be drawn becomes a note, not an error: by then the garment has been flattened and its other
-    files are good.
-
-    Args:
-        garments: flattened, by size; "" where there is none.
-        folder: created if it does not exist.
-        name: of the files.
-        options: formats, rules and cloth.
-        sample_size: the one that the files show first.
-        found_seams: of a garment whose seams were found; their prices are printed.
-
-    Raises:
-        InputError: a printed name is for no piece, or the folder cannot be written.
-    """
-    from warpflat.garment.construction.to_pattern import pattern_of_garment
-
-    options, first = options or PatternOptions(), next(iter(garments.values()))
-    if isinstance(first, FormGarment):
-        check_names(options.names, first.parts)
-
-    def make() -> tuple[Pattern, tuple[str, ...]]:
-        pattern, notes = pattern_of_garment(
-            garments, name=name, rules=options.rules, sample_size=sample_size, cloth_width=options.cloth_width
-        )
-        return replace(pattern, found_seams=tuple(found_seams)), notes
-
-    return _write_pattern(make, folder, name, options)
-
-
-def surface_files(
-    results: Sequence[Flattening],
-    folder: str | Path,
-    *,
-    name: str,
-    options: PatternOptions | None = None,
-    seams: Sequence[BorderSeam] = (),
-) -> WrittenPattern:
-    """Write the pattern of a flattened surface, or of the pieces into which cuts have parted it.
-
-    A pattern that cannot be drawn becomes a note, as in :func:`garment_files`.
-
-    Args:
-        results: the pieces.
-        folder: created if it does not exist.
-        name: of the files.
-        options: formats, rules and cloth.
-        seams: the named seams of its border.
-
-    Raises:
-        InputError: the folder cannot be written.
-    """
-    from warpflat.garment.construction.to_pattern import pattern_of_surface
-
-    options = options or PatternOptions()
-    return _write_pattern(
-        lambda: pattern_of_surface(results, name=name, rules=options.rules, seams=seams), folder, name, options
-    )
-
-
-def outline_files(pattern: Pattern, folder: str | Path, *, name: str, options: PatternOptions) -> WrittenPattern:
-    """Write a pattern of outlines; what cannot be drawn becomes a note, as in :func:`garment_files`.
-
-    Raises:
-        InputError: the folder cannot be written.
-    """
-    return _write_pattern(lambda: (pattern, ()), folder, name, options)
 
 
 def export_patterns(
@@ -297,7 +216,7 @@ def _rewritten(
 
     `over_itself` is whether pattern.json may be written over itself, as it may be where that is asked for.
     """
-    from warpflat.pattern import PATTERN_ENDINGS, read_drafted
+    from warpflat.pattern.export.read_pattern import PATTERN_ENDINGS, read_drafted
 
     is_file = source.suffix.lower() in PATTERN_ENDINGS and not source.is_dir()
     if not is_file and source.is_file():
@@ -327,11 +246,29 @@ def _rewritten(
                 record_file(folder, name, written)
 
 
-def _write_pattern(
-    make: Callable[[], tuple[Pattern, tuple[str, ...]]], to: str | Path, name: str, options: PatternOptions
+def write_pattern(
+    make: Callable[[], tuple[Pattern, tuple[str, ...]]], to: str | Path, *, name: str, options: PatternOptions
 ) -> WrittenPattern:
-    """Make, draft and write a pattern; what cannot be drawn or written of it is left out (:func:`warpflat.core.output.optional_step`)."""
-    from warpflat.pattern import MEET, TOLERANCE, cut_list, draft_garment, too_many_sheets, walk_seams
+    """Make, draft and write a pattern; what cannot be drawn or written of it is left out (:func:`warpflat.core.output.optional_step`).
+
+    A pattern that cannot be drawn becomes a note, not an error: by then the garment has been flattened and its other
+    files are good.
+
+    Args:
+        make: returns the pattern, and notes on it.
+        to: the folder, created if it does not exist.
+        name: of the files.
+        options: formats, rules and cloth.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    from warpflat.pattern.drafting.curves import TOLERANCE
+    from warpflat.pattern.drafting.cut_list import cut_list
+    from warpflat.pattern.drafting.draft import draft_garment
+    from warpflat.pattern.drafting.notches import MEET
+    from warpflat.pattern.drafting.walked import walk_seams
+    from warpflat.pattern.export.pdf import too_many_sheets
 
     if not options.formats and options.cloth is None:
         return WrittenPattern()
@@ -340,12 +277,6 @@ def _write_pattern(
     with listening_to_left_out(heard.append):
         with optional_step("no pattern was drawn", folder=Path(to)) as not_drawn:
             pattern, notes = make()
-            for cloth, add in (
-                (options.lining, add_lining), (options.interfacing, add_interfacing), (options.pocketing, add_pocketing),
-            ):  # fmt: skip
-                if cloth:
-                    with optional_step(f"the pattern has no {cloth}", folder=Path(to)):
-                        pattern = add(pattern, cloth)
             # In the printed names and units that were asked for.
             titled = {
                 size: tuple(
@@ -459,7 +390,12 @@ def _write(
     english: bool = False,
 ) -> tuple[str, tuple[str, ...]]:
     """Write one file and return its name, and what the format leaves out."""
-    from warpflat.pattern import write_dxf, write_garmentcode, write_pattern_json, write_pdf, write_plt, write_svg
+    from warpflat.pattern.export.dxf import write_dxf
+    from warpflat.pattern.export.garmentcode import write_garmentcode
+    from warpflat.pattern.export.pattern_json import write_pattern_json
+    from warpflat.pattern.export.pdf import write_pdf
+    from warpflat.pattern.export.plt import write_plt
+    from warpflat.pattern.export.svg import write_svg
 
     start, _, ending = FORMATS[kind].partition("{}")
     file = file_in(folder, start or name, ending) if "{}" in FORMATS[kind] else folder / start
@@ -495,7 +431,10 @@ def _marker(
 
     Returns names, notes and the measures of each marker, or why there is none.
     """
-    from warpflat.pattern import Stripes, cloths_of, make_marker, write_marker_svg
+    from warpflat.pattern.drafting.cut_list import cloths_of
+    from warpflat.pattern.drafting.marker import make_marker
+    from warpflat.pattern.drafting.matched_lay import Stripes
+    from warpflat.pattern.export.svg import write_marker_svg
 
     report_activity(f"laying the marker, {seconds} s at most")
     cloths = list(dict.fromkeys(each for row in drafted.pieces.values() for piece in row for each in cloths_of(piece)))

@@ -1,0 +1,104 @@
+"""The pattern files of a garment, and of a flattened surface."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from warpflat.core import optional_step
+from warpflat.garment.construction.form_garment import FormGarment
+from warpflat.garment.construction.linings import add_interfacing, add_lining, add_pocketing
+from warpflat.pattern import PatternOptions, WrittenPattern, check_names, write_pattern
+
+if TYPE_CHECKING:
+    from warpflat.flat import Flattening
+    from warpflat.garment.construction.border_seams import BorderSeam
+    from warpflat.garment.construction.garment import Garment
+    from warpflat.pattern import FoundSeam, Pattern
+
+__all__ = ["garment_files", "surface_files"]
+
+
+def garment_files(
+    garments: Mapping[str, Garment],
+    folder: str | Path,
+    *,
+    name: str,
+    options: PatternOptions | None = None,
+    sample_size: str | None = None,
+    found_seams: Sequence[FoundSeam] = (),
+) -> WrittenPattern:
+    """Write the pattern of a garment; on a form in one or more sizes, of which several lie upon each other as a nest.
+
+    A pattern that cannot be drawn becomes a note, not an error: by then the garment has been flattened and its other
+    files are good.
+
+    Args:
+        garments: flattened, by size; "" where there is none.
+        folder: created if it does not exist.
+        name: of the files.
+        options: formats, rules and cloth.
+        sample_size: the one that the files show first.
+        found_seams: of a garment whose seams were found; their prices are printed.
+
+    Raises:
+        InputError: a printed name is for no piece, or the folder cannot be written.
+    """
+    from warpflat.garment.construction.to_pattern import pattern_of_garment
+
+    options, first = options or PatternOptions(), next(iter(garments.values()))
+    if isinstance(first, FormGarment):
+        check_names(options.names, first.parts)
+
+    def make() -> tuple[Pattern, tuple[str, ...]]:
+        pattern, notes = pattern_of_garment(
+            garments, name=name, rules=options.rules, sample_size=sample_size, cloth_width=options.cloth_width
+        )
+        return _with_linings(replace(pattern, found_seams=tuple(found_seams)), options, Path(folder)), notes
+
+    return write_pattern(make, folder, name=name, options=options)
+
+
+def surface_files(
+    results: Sequence[Flattening],
+    folder: str | Path,
+    *,
+    name: str,
+    options: PatternOptions | None = None,
+    seams: Sequence[BorderSeam] = (),
+) -> WrittenPattern:
+    """Write the pattern of a flattened surface, or of the pieces into which cuts have parted it.
+
+    A pattern that cannot be drawn becomes a note, as in :func:`garment_files`.
+
+    Args:
+        results: the pieces.
+        folder: created if it does not exist.
+        name: of the files.
+        options: formats, rules and cloth.
+        seams: the named seams of its border.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    from warpflat.garment.construction.to_pattern import pattern_of_surface
+
+    options = options or PatternOptions()
+
+    def make() -> tuple[Pattern, tuple[str, ...]]:
+        pattern, notes = pattern_of_surface(results, name=name, rules=options.rules, seams=seams)
+        return _with_linings(pattern, options, Path(folder)), notes
+
+    return write_pattern(make, folder, name=name, options=options)
+
+
+def _with_linings(pattern: Pattern, options: PatternOptions, folder: Path) -> Pattern:
+    """Return a pattern with the lining, interfacing and pocketing that were asked for, without those that cannot be made."""
+    asked = (options.lining, add_lining), (options.interfacing, add_interfacing), (options.pocketing, add_pocketing)
+    for cloth, add in asked:
+        if cloth:
+            with optional_step(f"the pattern has no {cloth}", folder=folder):
+                pattern = add(pattern, cloth)
+    return pattern
