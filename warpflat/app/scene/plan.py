@@ -13,7 +13,6 @@ from warpflat.app.scene.form import scene_form, scene_mannequin
 from warpflat.app.scene.found_seams import found_seams, plain_panel, seams_entry
 from warpflat.app.scene.frames import FrameRecorder
 from warpflat.app.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
-from warpflat.app.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands
 from warpflat.app.scene.pattern_options import pattern_options
 from warpflat.app.scene.schema import PieceTable
 from warpflat.app.scene.seams import scene_constraints, scene_surface_seams, scene_wishes
@@ -42,7 +41,7 @@ from warpflat.garment import (
     FoundSeams,
     Garment,
     Mannequin,
-    Opening,
+    OpeningTable,
     SeamWish,
     SewnPanel,
     cap_wishes,
@@ -58,7 +57,9 @@ from warpflat.garment import (
     seam_words,
     select_bricks,
     sew_pieces,
+    sewn_centres,
     sized_opening,
+    straight_stands,
     unsewn_notes,
 )
 from warpflat.pattern import PatternOptions, check_names
@@ -281,7 +282,7 @@ class GarmentPlan(Plan):
     form: FormResult
     wishes: Sequence[SeamWish]
     constraints: Sequence[Constraint]
-    openings: Sequence[Opening]
+    openings: Sequence[OpeningTable]
     settings: Mapping[str, Any]
 
     @property
@@ -312,8 +313,6 @@ class GarmentPlan(Plan):
                 garment = flattened()
             if unsewn:
                 garment = flattened(sewn=False)
-            finishing = scene_finishing(self.scene.settings.finishing)
-            pockets = scene_pockets(self.scene.settings.pockets)
         for name, recorder in (recorders or {}).items():
             piece = garment.pieces[name]
             for layout in (piece.unsewn, piece):
@@ -322,8 +321,8 @@ class GarmentPlan(Plan):
         return replace(
             garment,
             openings=tuple(self.openings),
-            finishing=finishing,
-            pockets=pockets,
+            finishing=self.scene.settings.finishing,
+            pockets=self.scene.settings.pockets,
             remarks=(*unsewn, *garment.remarks),
         )
 
@@ -541,7 +540,10 @@ def plan_garment(
     mannequin, form = built or scene_form(scene)
     with errors_named(f"{scene.where}: pattern"):
         drawing = pattern_options(settings.pattern, settings.marker, settings.cloth)
-        openings = scene_openings(settings)
+        openings = list(settings.openings)
+        if settings.cloth is not None and settings.cloth.lining:
+            # A lining is sewn to the inner edges of the facings of button stands.
+            openings = [each.model_copy(update={"facing": each.facing or "separate"}) for each in openings]
         if settings.half:
             drawing = replace(drawing, rules=sewn_centres(drawing.rules, openings))
         plan = plan_form(form, drawing.rules)

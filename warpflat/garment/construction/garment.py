@@ -28,9 +28,7 @@ from warpflat.garment.construction.mirror import even_sides, mirror_images
 from warpflat.garment.construction.sewn import MeasuredSeam, Sewn, Stitching
 
 if TYPE_CHECKING:
-    from warpflat.garment.construction.finishing import Finishing
-    from warpflat.garment.construction.openings import Opening
-    from warpflat.garment.construction.pockets import Pocket
+    from warpflat.garment.construction.details import FinishingTable, OpeningTable, PocketTable
     from warpflat.garment.construction.rings import GarmentRing
     from warpflat.garment.construction.wearer import WearerFit
     from warpflat.pattern import Body, DraftedOutline
@@ -61,9 +59,9 @@ class Garment:
     stitching: Sequence[Stitching] = ()
     sewn: Sewn | None = None
     border_seams: Sequence[BorderSeam] = ()
-    openings: Sequence[Opening] = ()
-    finishing: Sequence[Finishing] = ()
-    pockets: Sequence[Pocket] = ()
+    openings: Sequence[OpeningTable] = ()
+    finishing: Sequence[FinishingTable] = ()
+    pockets: Sequence[PocketTable] = ()
     remarks: tuple[str, ...] = ()
     as_cut: CutPattern | None = None
     drape: Mapping[str, Any] | None = None

@@ -174,16 +174,13 @@ def pattern_of_garment(
         if opening.opens_the_top
     ]
     stands = [
-        Stand(
-            piece=piece.name, edge=edge.name, width=opening.buttons.facing_width,
-            grown_on=opening.buttons.facing == "grown-on",
-        )
+        Stand(piece=piece.name, edge=edge.name, width=opening.facing_width, grown_on=opening.facing != "separate")
         for opening in sample.openings
-        if opening.buttons is not None
+        if opening.kind == "buttons"
         for piece in pattern.pieces[pattern.sample]
         for edge in piece.edges
-        if edge.name == f"{opening.line} {STAND}"
-    ]  # fmt: skip
+        if edge.name == f"{opening.seam} {STAND}"
+    ]
     rises = hem_rises(pattern, sample.finishing)
     with optional_step("the pattern has no finishing"):
         girths = {size: garment.body_girths for size, garment in laid.items()}
