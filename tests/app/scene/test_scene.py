@@ -261,24 +261,6 @@ def test_files_that_are_not_wanted_are_not_written(tmp_path: Path):
     assert set(result.files) == {"metrics.json", "trial.obj"}
 
 
-def test_a_run_that_is_stopped_leaves_no_half_file(tmp_path: Path):
-    scene = load_scene(write_scene(tmp_path, DOME))
-
-    def stop(progress: object) -> None:
-        if getattr(progress, "step", 0) >= 3:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        run_scene(scene, tmp_path / "out", on_progress=stop)
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_run_that_meets_its_step_limit_says_so(tmp_path: Path):
-    scene = load_scene(write_scene(tmp_path, DOME + "[relax]\nmax_steps = 3\n"))
-    result = run_scene(scene, tmp_path / "out")
-    assert result.metrics["pieces"]["trial"]["stages"][-1]["converged"] is False
-
-
 # --- scripts
 
 
