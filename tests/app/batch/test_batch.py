@@ -20,6 +20,8 @@ from warpflat.app.batch.task import Row, read_row, set_aside
 from warpflat.app.cli.batch import batch
 from warpflat.app.scene.load import load_scene
 from warpflat.core.errors import InputError
+from warpflat.core.input_files import read_result
+from warpflat.core.output import write_sealed
 
 SCENES = Path(__file__).parents[3] / "scenes"
 PATCH = """
@@ -143,7 +145,17 @@ def test_what_is_done_is_not_done_again(tmp_path: Path):
     assert [row.status for row in rows] == ["at rest"] * 3
     assert seen == [(2, 2), (3, 2)]
     assert {name: files(out)[name] for name in before} == before
-    (out / tasks[0].key / "metrics.json").unlink()  # half a result is none
+    # It is done where `warpflat run` would end with 0.
+    metrics = out / tasks[0].key / "metrics.json"
+    for fault in (
+        {"pattern": {"seams_that_differ": ["side"], "seam_difference_mm": 9.0, "seam_difference_per_50mm_mm": None}},
+        {"garment": {"no_pattern": "no pattern yet"}},
+        {"left_out": ["it was not sewn"]},
+    ):
+        write_sealed(metrics, {**read_result(metrics), **fault})
+        assert read_row(tasks[0], out).status == "not at rest"
+        write_sealed(metrics, {key: value for key, value in read_result(metrics).items() if key not in fault})
+    metrics.unlink()  # half a result is none
     assert read_row(tasks[0], out) is None
 
 

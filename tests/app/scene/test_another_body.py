@@ -151,6 +151,15 @@ def test_without_its_body_one_is_fitted_inside(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
+    ("front", "faces"), [("+x", (1.0, 0.0, 0.0)), ("-x", (-1.0, 0.0, 0.0)), ("-z", (0.0, 0.0, -1.0))]
+)
+def test_the_front_is_turned_to_where_a_body_faces(tmp_path: Path, front: str, faces: tuple[float, float, float]):
+    _skirt(tmp_path / "skirt.obj")
+    job = FitJob.start(tmp_path / "skirt.obj", units="m", front=front)
+    assert np.array(faces) @ job.turn == pytest.approx([0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize(
     ("options", "says"),
     [
         ((*ON, "--to", "EU 39"), "--to: size 'EU 39' is in no table"),
