@@ -115,6 +115,20 @@ def test_a_key_follows_content_not_paths(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
+    "named", ["[seams]\nbody = 'named'\n", "[find_seams]\nbody = 'named'\n", "[[seams_cut]]\nedges = 'named'\n"]
+)
+def test_each_file_that_a_scene_names_starts_in_its_folder_and_counts(tmp_path: Path, named: str):
+    (tmp_path / "mesh.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n")
+    (tmp_path / "patch.toml").write_text('[surface]\nfile = "mesh.obj"\n' + named)
+    (tmp_path / "b.toml").write_text('scenes = ["patch.toml"]\n')
+    (tmp_path / "named").write_text("0 1\n")
+    (task,) = load_batch(tmp_path / "b.toml")
+    assert str(tmp_path / "named") in json.dumps(task.data)
+    (tmp_path / "named").write_text("1 2\n")
+    assert load_batch(tmp_path / "b.toml")[0].key != task.key
+
+
+@pytest.mark.parametrize(
     ("text", "words"),
     [
         ("", "is empty"),

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpflat.app.scene.load import Scene, errors_named
+from warpflat.app.scene.load import Scene, errors_named, fabric_of_correction
 from warpflat.app.scene.schema import DrapeTable
 from warpflat.core import report_activity
 from warpflat.garment import Garment, garment_files
@@ -68,12 +68,11 @@ def write_drape(
         # Correct the pattern, and write it beside the first.
         from warpflat.app.scene.pattern_options import pattern_options
         from warpflat.core import optional_file
-        from warpflat.flat import find_fabric
         from warpflat.garment import correct_pattern
 
         report_activity("correcting the pattern")
         with errors_named(scene.where):
-            other = None if table.correct_fabric is None else find_fabric(table.correct_fabric)
+            other = fabric_of_correction(scene)
             found = correct_pattern(
                 draped, hold=[*table.hold, *draped.threaded], fabric=other, worn_shape=other is not None
             )
