@@ -34,7 +34,6 @@ from warpflat.flat import (
 from warpflat.garment import (
     CURVES_MM,
     GRAIN,
-    BorderSeam,
     Constraint,
     FormGarment,
     FormResult,
@@ -42,6 +41,7 @@ from warpflat.garment import (
     Garment,
     Mannequin,
     OpeningTable,
+    SeamTable,
     SeamWish,
     SewnPanel,
     cap_wishes,
@@ -173,7 +173,7 @@ class MeshPlan(Plan):
     """
 
     sequences: Sequence[CutSequence]
-    seams: Sequence[BorderSeam] = ()
+    seams: Sequence[SeamTable] = ()
     panels: Sequence[SewnPanel] = ()
 
     @property
