@@ -41,7 +41,6 @@ from warpflat.flat import (
 from warpflat.garment import (
     CURVES_MM,
     GRAIN,
-    BorderSeam,
     Constraint,
     FormGarment,
     FormResult,
@@ -49,6 +48,7 @@ from warpflat.garment import (
     Garment,
     Mannequin,
     OpeningTable,
+    SeamTable,
     SeamWish,
     SewnPanel,
     cap_wishes,
@@ -180,7 +180,7 @@ class MeshPlan(Plan):
     """
 
     sequences: Sequence[CutSequence]
-    seams: Sequence[BorderSeam] = ()
+    seams: Sequence[SeamTable] = ()
     panels: Sequence[SewnPanel] = ()
 
     @property

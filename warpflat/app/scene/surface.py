@@ -63,7 +63,7 @@ def scene_surface(scene: Scene, read: tuple[Path, RawMesh, float, list[Path]] | 
     wanted = {} if scene.settings.datum is None else {"datum": scene.settings.datum}
     wanted |= {f"constraints[{i}]": constraint.line for i, constraint in enumerate(scene.settings.constraints)}
     named = scene_surface_seams(scene.settings.seams, scene.name)
-    wanted |= {f"seams[{i}].sides[{k}]": seam.sides[k] for i, seam in enumerate(named) for k in (0, 1)}
+    wanted |= {f"seams[{i}].sides[{k}]": seam.lines[k] for i, seam in enumerate(named) for k in (0, 1)}
     surface = _with_table_lines(surface, scene.settings.lines, wanted, where=f"{scene.where}: ")
     with errors_named(f"{scene.where}: seams"):
         surface_seams(surface, named)

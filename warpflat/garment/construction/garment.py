@@ -21,7 +21,7 @@ from warpflat.core import (
     write_report,
 )
 from warpflat.flat import Flattening, run_metrics, separate
-from warpflat.garment.construction.border_seams import BorderSeam
+from warpflat.garment.construction.border_seams import SeamTable
 from warpflat.garment.construction.edges import SAME_PIECE
 from warpflat.garment.construction.laid_as_cut import CutPattern
 from warpflat.garment.construction.mirror import even_sides, mirror_images
@@ -58,7 +58,7 @@ class Garment:
     pieces: Mapping[str, Flattening]
     stitching: Sequence[Stitching] = ()
     sewn: Sewn | None = None
-    border_seams: Sequence[BorderSeam] = ()
+    border_seams: Sequence[SeamTable] = ()
     openings: Sequence[OpeningTable] = ()
     finishing: Sequence[FinishingTable] = ()
     pockets: Sequence[PocketTable] = ()
