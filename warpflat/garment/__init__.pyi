@@ -2,7 +2,7 @@
 
 from .construction.as_cut import garment_as_cut as garment_as_cut
 from .construction.as_cut import read_cut_pattern as read_cut_pattern
-from .construction.border_seams import BorderSeam as BorderSeam
+from .construction.border_seams import SeamTable as SeamTable
 from .construction.border_seams import surface_seams as surface_seams
 from .construction.carry import carry as carry
 from .construction.constraints import Constraint as Constraint

@@ -19,12 +19,13 @@ from pydantic import (
 from warpflat.app.scene.first_shapes import PIECES
 from warpflat.core import Table, is_number, plain_name, quote_value
 from warpflat.flat import DEFAULT_FABRIC, FORMER_SOLVERS, FabricTable, RelaxOptions, Solver
-from warpflat.garment import FinishingTable, MannequinTable, OpeningTable, PocketTable
+from warpflat.garment import FinishingTable, FormDart, MannequinTable, OpeningTable, PocketTable, SeamTable
 
 if TYPE_CHECKING:
     from warpflat.garment import DrapeOptions
 
 __all__ = [
+    "PATH_KEYS",
     "AutoCutTable",
     "BorderTable",
     "ClothTable",
@@ -39,7 +40,6 @@ __all__ = [
     "PieceTable",
     "SceneTable",
     "SeamCutTable",
-    "SeamTable",
     "ShapeSurface",
     "kind_of_surface",
 ]
@@ -146,19 +146,8 @@ class CutTable(Table):
 
     def check_for_surface(self, where: str) -> None:
         """Refuse what only a dart in a form has."""
-        given = self.model_fields_set & {
-            "piece",
-            "towards",
-            "between",
-            "tip_mm",
-            "mouth_mm",
-            "like",
-            "pleat_mm",
-            "at",
-            "omit",
-            "mirrored",
-        }
-        if given:
+        of_darts = {"omit", *(field.name for field in dataclasses.fields(FormDart))} - {"name", "line", "part"}
+        if given := self.model_fields_set & of_darts:
             raise ValueError(f"{where}: {sorted(given)[0]} belongs to a form's darts; leave it out on a [surface]")
 
     @model_validator(mode="after")
@@ -276,31 +265,6 @@ class PieceTable(Table):
     """Angle from the datum to the warp, counter-clockwise; that of the scene if not given."""
     lines: dict[str, LineTable] = Field(default_factory=dict)
     cuts: list[CutTable] = Field(default_factory=list)
-
-
-class SeamTable(Table):
-    """A seam: on a form one of those that it has, on a [surface] two lines along its border that are sewn together.
-
-    A form's seam is named as in the pattern, and one side is longer than the other. On a [surface] `sides` names the two lines,
-    as "left" or "piece.left"; they may be equally long.
-
-    `fullness` is eased in near the seam (0.02 is 2 %), at a sleeve's cap above its notches only. `gather` is the ratio of the
-    lengths, and its fullness falls on through the piece. `longer` names the piece, "piece.edge" or line that is longer; the
-    seam's second side if not given.
-    """
-
-    name: str = Field(min_length=1)
-    sides: Annotated[list[str], Field(min_length=2, max_length=2)] | None = None
-    fullness: Annotated[float, Field(ge=0, le=0.3)] | None = None
-    gather: Annotated[float, Field(ge=1, le=5)] | None = None
-    longer: str | None = None
-
-    @model_validator(mode="after")
-    def _one_way(self) -> SeamTable:
-        given = (self.fullness is not None) + (self.gather is not None)
-        if given > 1 or (given == 0 and self.sides is None):
-            raise ValueError("give either fullness = 0.02 (2 %, eased in) or gather = 1.5 (times as long)")
-        return self
 
 
 class FindSeamsTable(Table):
@@ -502,6 +466,11 @@ else:
     RelaxTable = create_model("RelaxTable", __base__=Table, **_RELAX_FIELDS)
 
 
+#: Keys of a scene under which files are named, from table to table; some have other values, too.
+PATH_KEYS = (
+    ("start",), ("fabric_files",), ("surface", "file"), ("mannequin", "scan"), ("seams", "body"), ("find_seams", "body"),
+    ("seams_cut", "edges"),
+)  # fmt: skip
 # Keys of a scene that change the pattern of a mesh.
 _CHANGES_PATTERN = (
     "lines", "cuts", "auto_cut", "pieces", "seams", "find_seams", "seams_cut", "constraints", "datum", "start", "grain_angle", "bands",

@@ -79,7 +79,7 @@ from warpflat.pattern import (
 
 if TYPE_CHECKING:
     from warpflat.flat import Crack, Flattening, Surface
-    from warpflat.garment.construction.border_seams import BorderSeam
+    from warpflat.garment.construction.border_seams import SeamTable
     from warpflat.garment.construction.garment import Garment
     from warpflat.garment.construction.openings import OpeningPart
     from warpflat.garment.construction.sewn import Stitching
@@ -495,7 +495,7 @@ def pattern_of_surface(
     name: str,
     rules: EdgeRules | None = None,
     size: str = "",
-    seams: Sequence[BorderSeam] = (),
+    seams: Sequence[SeamTable] = (),
     ends: Mapping[str, Collection[int]] | None = None,
     worn: Collection[str] = (),
 ) -> tuple[Pattern, tuple[str, ...]]:
@@ -535,7 +535,7 @@ def pattern_of_surface(
     named = []
     for seam in seams:
         with optional_step(f"seam {seam.name!r} was left out of the pattern"):
-            first, second = (_edges_along(line, results, pieces) for line in seam.sides)
+            first, second = (_edges_along(line, results, pieces) for line in seam.lines)
             back = tuple(replace(side, reversed=True) for side in reversed(second))  # the two run against each other
             named.append(Seam(name=seam.name, sides=(first, back), ease=seam.ease))
     names = {p.name: [*(edge.name for edge in p.edges), *(hole.name for hole in p.holes)] for p in pieces}
