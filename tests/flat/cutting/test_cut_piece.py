@@ -452,6 +452,8 @@ def test_the_ledger_ranks_candidates_by_what_they_release(bodice: Flattening):
     # Coarse is enough to rank: within a few per cent of the full relaxation.
     full = cut(bodice, CutPlan(name="x", paths=pair.candidate.paths))
     assert pair.released == pytest.approx(stored(bodice) - stored(full), rel=0.05)
+    widest = max(seam["opening_m"] for seam in full.measures["cuts"][0]["seams"])
+    assert pair.opening == pytest.approx(widest, rel=0.05)
 
 
 def test_cutting_by_itself_stops_when_it_is_enough(bodice: Flattening):
