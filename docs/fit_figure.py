@@ -14,7 +14,6 @@ import numpy as np
 import warpflat
 from warpflat.app.scene.fit import FitJob
 from warpflat.garment.mannequin.body_model import finer_body
-from warpflat.pattern.export.colours import SKIN
 from warpflat.pattern.export.dressed import Body, dress
 from warpflat.pattern.export.figure import drawn_page
 from warpflat.pattern.export.views import draw_row, view_from_side
@@ -40,10 +39,10 @@ def main(file: str) -> None:
                 wearer = Body(vertices=carried.skin, faces=finer_body()[1])
                 # The form has vertices beyond the shirt.
                 room = carried.vertices[np.unique(faces[faces >= 0])]
-                points, facets, count = dress(wearer, carried.vertices, faces.astype(np.int32), room)
+                points, facets, skin = dress(wearer, carried.vertices, faces.astype(np.int32), room)
                 view = view_from_side(points, facets, 0.0)
                 view.points[: len(carried.vertices), 2] += NEARER
-                shades = np.concatenate([np.tile(CLOTH, (len(faces), 1)), np.tile(SKIN, (count, 1))])
+                shades = np.concatenate([np.tile(CLOTH, (len(faces), 1)), skin])
                 middle = pen.width * (number + 0.5) / len(BODIES)
                 title = f"{body}{' (made for)' if number == 0 else ''}"
                 left = middle - 0.5 * SCALE * float(view.size[0])

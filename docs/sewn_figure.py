@@ -14,11 +14,10 @@ import numpy as np
 from pxr import Usd, UsdGeom
 
 from warpflat.pattern.drafting.layout import lay_out, nests
-from warpflat.pattern.export.colours import SKIN
 from warpflat.pattern.export.dressed import Body, dress
 from warpflat.pattern.export.figure import Pen, write_figure
 from warpflat.pattern.export.pattern_json import read_pattern_json
-from warpflat.pattern.export.views import draw_row, view_from_side
+from warpflat.pattern.export.views import SIDES, draw_row, views_around
 
 CLOTH = (0.36, 0.52, 0.68)
 # The cloth is drawn this much nearer than the body below it [m].
@@ -48,13 +47,13 @@ def mesh(film: Path, name: str) -> tuple[np.ndarray, np.ndarray]:
 def main(file: str, folder: Path) -> None:
     """Write the figure to `file`, of a shirt that lies in a folder."""
     film = folder / "worn" / "frames.usdc"
-    vertices, skin = mesh(film, "body")
+    vertices, body = mesh(film, "body")
     worn, cloth = mesh(film, "cloth")
-    points, facets, count = dress(Body(vertices=vertices, faces=skin), worn, cloth)
-    views = {"front": view_from_side(points, facets, 0.0), "back": view_from_side(points, facets, 180.0)}
+    points, facets, skin = dress(Body(vertices=vertices, faces=body), worn, cloth)
+    views = views_around(points, facets, (SIDES[0], SIDES[-1]))
     for view in views.values():
         view.points[: len(worn), 2] += NEARER
-    shades = np.concatenate([np.tile(CLOTH, (len(cloth), 1)), np.tile(SKIN, (count, 1))])
+    shades = np.concatenate([np.tile(CLOTH, (len(cloth), 1)), skin])
     wide, high = views["front"].size[:2].tolist()
     scale = min(3.6 / wide, 3.2 / high)
     pen = Pen(11.0, 3.5, dpi=110)

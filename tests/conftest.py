@@ -9,6 +9,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+# As the command has it: threads of BLAS that wait for each other on a busy machine take several times the processor's time.
+# Before NumPy is loaded, which reads it once.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("WARPFLAT_THREADS", "1")
+
 import pytest
 from command import Command, command_in
 from rounding import disturb
@@ -16,10 +22,6 @@ from rounding import disturb
 from warpflat.core.errors import InputError
 from warpflat.core.usd_process import UNREADABLE
 
-if "PYTEST_XDIST_WORKER" in os.environ:
-    os.environ.setdefault("WARPFLAT_THREADS", "1")
-# As the command has it: threads of BLAS that wait for each other on a busy machine take several times the processor's time.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # As the program has it: libraries make a million objects that stay, and Python's own numbers search them time and again.
 gc.set_threshold(50_000, 20, 100)
 # Processes that tests start would each compile the package anew, for a second or two, if none kept what it has compiled.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from surface_meshes import quads_between
 
 from warpflat.flat.surface.mesh import Surface
 
@@ -11,7 +12,7 @@ from warpflat.flat.surface.mesh import Surface
 def grid(n: int, m: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """m by n vertex indices, and #F by 4 quads."""
     index = np.arange(n * m, dtype=np.int32).reshape(m, n)
-    quads = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
+    quads = quads_between(index)
     return index, np.ascontiguousarray(quads)
 
 

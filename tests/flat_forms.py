@@ -9,11 +9,11 @@ from typing import Any
 
 from bodies import body_of_size
 
-from warpflat.app.scene.openings import straight_stands
-from warpflat.garment.construction.finishing import Finishing
+from warpflat.garment.construction.constraints import straight_stands
+from warpflat.garment.construction.details import FinishingTable, OpeningTable
 from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.garment import Garment
-from warpflat.garment.construction.openings import Opening, part_at_centres
+from warpflat.garment.construction.openings import part_at_centres
 from warpflat.garment.construction.to_pattern import pattern_of_garment
 from warpflat.garment.mannequin.forms import shipped_form
 from warpflat.pattern.drafting.draft import draft_garment
@@ -24,7 +24,7 @@ __all__ = ["flat_form", "pattern_of", "whole_draft"]
 
 
 @functools.cache
-def flat_form(name: str, *openings: Opening, half: bool = False) -> Garment:
+def flat_form(name: str, *openings: OpeningTable, half: bool = False) -> Garment:
     """A shipped form, sewn, with openings at which it is parted, unless it is a half; edges of stands are straight."""
     mannequin, form = body_of_size(30.0), shipped_form(name)
     built = mannequin.form(form if half else part_at_centres(mannequin.layout, form, openings), half=half)
@@ -34,7 +34,7 @@ def flat_form(name: str, *openings: Opening, half: bool = False) -> Garment:
 
 
 def pattern_of(
-    garment: Garment, *finishing: Finishing, openings: Sequence[Opening] | None = None, **options: Any
+    garment: Garment, *finishing: FinishingTable, openings: Sequence[OpeningTable] | None = None, **options: Any
 ) -> Pattern:
     """The pattern of a garment that is finished so, with other openings than its own if some are given."""
     openings = garment.openings if openings is None else openings

@@ -31,12 +31,24 @@ def sphere(u: NDArray[np.float64], v: NDArray[np.float64], radius: float = 0.2) 
     return radius * np.stack([np.sin(a) * np.cos(b), np.sin(b), np.cos(a) * np.cos(b)], axis=-1)
 
 
+def quads_between(index: NDArray[np.int64] | tuple[int, int], *, turned: bool = False) -> NDArray[np.int32]:
+    """Quads between the rows and columns of a table of vertices, counter-clockwise where columns run along +X and rows along +Y.
+
+    Args:
+        index: numbers of the vertices, or how many rows and columns there are, numbered row by row.
+        turned: clockwise instead.
+    """
+    i = np.arange(index[0] * index[1]).reshape(index) if isinstance(index, tuple) else index
+    corners = [i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]]
+    if turned:
+        corners = [corners[k] for k in (0, 3, 2, 1)]
+    return np.stack(corners, axis=-1).reshape(-1, 4).astype(np.int32)
+
+
 def grid(columns: int, rows: int, place: Place = plane) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """Vertices row by row from below, and quads wound counter-clockwise as seen from +Z."""
     u, v = np.meshgrid(np.linspace(0, 1, columns), np.linspace(0, 1, rows))
-    i = np.arange(columns * rows, dtype=np.int32).reshape(rows, columns)
-    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
-    return place(u.ravel(), v.ravel()), quads
+    return place(u.ravel(), v.ravel()), quads_between((rows, columns))
 
 
 def rings(columns: int, rows: int) -> tuple[NDArray[np.float64], NDArray[np.int32]]:

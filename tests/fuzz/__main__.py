@@ -17,10 +17,8 @@ import click
 from tqdm import tqdm
 
 from .folders import packed
-from .foreign_files import FOREIGN_ENDINGS
-from .geometry import GEOMETRY_SHARES
+from .kinds import FILE_KINDS, KINDS, random_case
 from .known_faults import known_faults
-from .mutations import SHARES, random_case
 from .promise import Case, Verdict, Worker
 
 FOUND = Path(__file__).with_name("found")
@@ -53,28 +51,15 @@ def _judged(cases: Iterator[Case], *, workers: int, seconds: float | None) -> It
 def _save(case: Case, number: int) -> Path:
     """Leaves the odd file of a case, or its command line, where it can be run again and moved to tests/regressions."""
     FOUND.mkdir(exist_ok=True)
-    if case.kind in ("batch", "result", "folder", *GEOMETRY_SHARES):
-        file = FOUND / f"{number}.folder.json"
-        file.write_bytes(packed(case))
-        return file
-    name = case.subject or next((file for file in case.files if case.kind in file), "")
     if case.kind == "arguments":
-        content = json.dumps(case.arguments).encode()
-    elif case.kind == "metrics":
-        name, content = "out/metrics.json", case.files["out/metrics.json"]
+        ending, content = ".arguments.json", json.dumps(case.arguments).encode()
+    elif case.kind == "studio":
+        ending, content = ".studio.json", case.files["attack.json"]
+    elif case.kind in FILE_KINDS:
+        ending, content = FILE_KINDS[case.kind], [*case.files.values()][-1]
     else:
-        content = case.files[name]
-    ending = {
-        "pattern": "pattern.json",
-        "metrics": "metrics.json",
-        "scan": "scan.obj",
-        "fit": "fit.obj",
-        "sewn": "sewn.obj",
-        "arguments": "arguments.json",
-        "studio": "studio.json",
-        **{kind: ending[1:] for ending, kind in FOREIGN_ENDINGS.items()},
-    }.get(case.kind, f"{case.kind}.toml" if name.endswith(".toml") else case.kind)
-    file = FOUND / f"{number}.{ending}"
+        ending, content = ".folder.json", packed(case)
+    file = FOUND / f"{number}{ending}"
     file.write_bytes(content)
     return file
 
@@ -120,7 +105,7 @@ def _list_faults(workers: int, only: set[str]) -> int:
 @click.option("--cases", type=int, default=5000, show_default=True, help="How many mutations.")
 @click.option("--seconds", type=float, help="Stop after this time.")
 @click.option("--seed", type=int, default=0, show_default=True, help="The same seed gives the same cases.")
-@click.option("--only", default="", help=f"Kinds, separated by commas: {', '.join(SHARES)}.")
+@click.option("--only", default="", help=f"Kinds, separated by commas: {', '.join(KINDS)}.")
 @click.option("--workers", type=int, default=2, show_default=True)
 @click.option("--list", "listed", is_flag=True, help="Run the faults once found instead.")
 @click.option("--again", type=click.Path(exists=True, path_type=Path), multiple=True, help="Run these files instead.")
@@ -136,9 +121,9 @@ def main(
 
         drawn = iter([case for file in again for case in cases_of(file)])
         sys.exit(_fuzz(_judged(drawn, workers=workers, seconds=seconds), None) > 0)
-    if unknown := chosen - SHARES.keys():
-        raise click.BadParameter(f"{', '.join(unknown)}: choose from {', '.join(SHARES)}", param_hint="--only")
-    shares = {kind: share for kind, share in SHARES.items() if not chosen or kind in chosen}
+    if unknown := chosen - KINDS.keys():
+        raise click.BadParameter(f"{', '.join(unknown)}: choose from {', '.join(KINDS)}", param_hint="--only")
+    shares = {name: kind.share for name, kind in KINDS.items() if not chosen or name in chosen}
     randoms = (Random(f"{seed} {number}") for number in count())
     drawn = (random_case(random.choices(list(shares), list(shares.values()))[0], random) for random in randoms)
     sys.exit(_fuzz(_judged(islice(drawn, cases), workers=workers, seconds=seconds), cases) > 0)

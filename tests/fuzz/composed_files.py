@@ -16,19 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from .promise import Case
-from .seeds import meshes
+from .foreign_files import tags
+from .promise import Case, words
+from .seeds import BARE, meshes
 
-__all__ = ["COMPOSED_SHARES", "composed_case"]
+__all__ = ["drawn", "extension", "stage"]
 
-COMPOSED_SHARES = {"drawn": 8, "stage": 3, "gltf extension": 4}
 _FOLDS = (0.0, 90.0, 33.0, 200.0)
-
-
-def composed_case(kind: str, random: Random) -> Case:
-    """A file of one of these kinds, and a command that reads it."""
-    return {"drawn": _drawn, "stage": _stage, "gltf extension": _extension}[kind](random)
-
 
 Points = list[tuple[float, float]]
 
@@ -56,13 +50,9 @@ def _runs(random: Random, points: Points) -> list[Points]:
     return [run[:: random.choice((1, -1))] for run in runs]
 
 
-def _tags(*pairs: tuple[int, object]) -> str:
-    return "".join(f"{code}\n{value}\n" for code, value in pairs)
-
-
 def _line(points: Sequence[tuple[float, float]], layer: str, *, closed: bool = False) -> str:
-    rows = "".join(_tags((0, "VERTEX"), (8, layer), (10, f"{x:.4f}"), (20, f"{y:.4f}")) for x, y in points)
-    return _tags((0, "POLYLINE"), (8, layer), (66, 1), (70, int(closed))) + rows + _tags((0, "SEQEND"), (8, layer))
+    rows = "".join(tags((0, "VERTEX"), (8, layer), (10, f"{x:.4f}"), (20, f"{y:.4f}")) for x, y in points)
+    return tags((0, "POLYLINE"), (8, layer), (66, 1), (70, int(closed))) + rows + tags((0, "SEQEND"), (8, layer))
 
 
 def _dxf(random: Random, names: Sequence[str]) -> bytes:
@@ -71,23 +61,23 @@ def _dxf(random: Random, names: Sequence[str]) -> bytes:
         outline = _outline(random, 800.0 * number)
         folded = random.randrange(3) == 0
         size = random.choice(("", "M"))
-        block = _tags((0, "BLOCK"), (8, 1), (2, f"B{number}"), (70, 0), (10, 0), (20, 0))
+        block = tags((0, "BLOCK"), (8, 1), (2, f"B{number}"), (70, 0), (10, 0), (20, 0))
         for text in (f"Piece Name: {name}", f"Size: {size}"):
-            block += _tags((0, "TEXT"), (8, 1), (10, 0), (20, 0), (40, 5), (1, text))
+            block += tags((0, "TEXT"), (8, 1), (10, 0), (20, 0), (40, 5), (1, text))
         if folded:
             block += _line([outline[0], outline[-1]], "6")
         if folded and random.randrange(2):
             block += _line(outline, "1")
         else:
             block += "".join(_line(run, "1") for run in _runs(random, outline))
-        blocks += block + _tags((0, "ENDBLK"), (8, 1))
-        inserts += _tags((0, "INSERT"), (8, 1), (2, f"B{number}"), (10, 0), (20, 0))
-    units = _tags((0, "TEXT"), (8, 1), (10, 0), (20, 0), (40, 5), (1, "UNITS: METRIC"))
-    head = _tags(
+        blocks += block + tags((0, "ENDBLK"), (8, 1))
+        inserts += tags((0, "INSERT"), (8, 1), (2, f"B{number}"), (10, 0), (20, 0))
+    units = tags((0, "TEXT"), (8, 1), (10, 0), (20, 0), (40, 5), (1, "UNITS: METRIC"))
+    head = tags(
         (0, "SECTION"), (2, "HEADER"), (9, "$ACADVER"), (1, "AC1009"), (0, "ENDSEC"), (0, "SECTION"), (2, "BLOCKS")
     )
-    middle = _tags((0, "ENDSEC"), (0, "SECTION"), (2, "ENTITIES"))
-    return (head + blocks + middle + units + inserts + _tags((0, "ENDSEC"), (0, "EOF"))).encode()
+    middle = tags((0, "ENDSEC"), (0, "SECTION"), (2, "ENTITIES"))
+    return (head + blocks + middle + units + inserts + tags((0, "ENDSEC"), (0, "EOF"))).encode()
 
 
 def _svg(random: Random, names: Sequence[str]) -> bytes:
@@ -115,7 +105,7 @@ def _svg(random: Random, names: Sequence[str]) -> bytes:
     return f"{head}{frame}{shapes}</svg>".encode()
 
 
-def _drawn(random: Random) -> Case:
+def drawn(random: Random) -> Case:
     names = random.sample(("FRONT", "BACK", "SLEEVE", "YOKE", "COLLAR", "POCKET"), random.randrange(1, 6))
     ending, made = random.choice((("dxf", _dxf), ("svg", _svg)))
     file = f"drawn.{ending}"
@@ -127,7 +117,7 @@ def _drawn(random: Random) -> Case:
     return Case("drawn", {file: made(random, names)}, arguments, file, names=listed, refused=False, seconds=60.0)
 
 
-def _stage(random: Random) -> Case:
+def stage(random: Random) -> Case:
     """Layers in a row, each referring to the next in some way; the last is a mesh, or not there as it should be."""
     mesh = meshes("usda")[0]
     count = random.randrange(1, 4)
@@ -156,7 +146,7 @@ def _stage(random: Random) -> Case:
         links[f"in/{last}"] = "../elsewhere/mesh.usda"
     elif wrong != "missing":
         files[f"in/{last}"] = mesh[: len(mesh) // 2] if wrong == "damaged" else mesh
-    arguments = ("flatten", "in/stage.usda", "--quiet", "--out", "made", "--frames", "0", "--no-picture")
+    arguments = words(f"flatten in/stage.usda --out made {BARE}")
     return Case("stage", files, arguments, "in/stage.usda", links=links, refused=bool(wrong), seconds=60.0)
 
 
@@ -185,7 +175,7 @@ def _odd(key: str, value: object) -> Callable[[dict[str, Any], Random], None]:
     return change
 
 
-def _extension(random: Random) -> Case:
+def extension(random: Random) -> Case:
     table = json.loads(meshes("gltf")[0])
     name = random.choice(
         ("KHR_unheard_of", "EXT_meshopt_compression", "KHR_draco_mesh_compression", "KHR_materials_unlit", "VRM")
@@ -202,5 +192,5 @@ def _extension(random: Random) -> Case:
         change(table, random)
     if random.randrange(4) == 0:
         table["meshes"][0]["primitives"][0]["mode"] = random.choice((0, 1, 5, 6, 7))
-    arguments = ("flatten", "odd.gltf", "--units", "m", "--quiet", "--out", "made", "--frames", "0", "--no-picture")
+    arguments = words(f"flatten odd.gltf --units m --out made {BARE}")
     return Case("gltf extension", {"odd.gltf": json.dumps(table).encode()}, arguments, "odd.gltf", refused=refused)

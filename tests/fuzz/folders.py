@@ -15,7 +15,7 @@ from typing import Any
 
 from warpflat.core.output import seal_of
 
-from .mutations import WORDS, damaged_bytes, damaged_json, damaged_toml
+from .damage import WORDS, damaged_bytes, damaged_json, damaged_toml
 from .promise import Case
 
 __all__ = ["packed", "random_folder", "unpacked"]

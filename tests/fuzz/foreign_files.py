@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import functools
 import json
-import math
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from random import Random
@@ -26,27 +25,11 @@ from warpflat.pattern.drafting.piece_parts import Edge, Hole
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.pattern.export.pattern_json import pattern_json
 
-from .promise import Case
+from .damage import damaged_bytes, damaged_json, damaged_toml
 
-__all__ = ["FOREIGN_ENDINGS", "FOREIGN_SHARES", "foreign_bounds", "foreign_case", "foreign_cases_of_file"]
+__all__ = ["MEMBERS", "damaged_foreign", "drawing", "in_out", "tags"]
 
-FOREIGN_SHARES = {
-    "dxf": 10, "svg": 10, "sewing": 3, "garmentcode": 3, "rul": 1, "frames": 3, "lift": 4, "runmetrics": 4, "runpattern": 3,
-    "worn": 2,
-}  # fmt: skip
-FOREIGN_ENDINGS = {
-    ".dxf": "dxf",
-    ".svg": "svg",
-    ".sewing.toml": "sewing",
-    ".garmentcode.json": "garmentcode",
-    ".rul": "rul",
-    ".frames.usdc": "frames",
-    ".lift.obj": "lift",
-    ".runmetrics.json": "runmetrics",
-    ".runpattern.json": "runpattern",
-    ".worn.json": "worn",
-}
-_MEMBERS = {
+MEMBERS = {
     "frames": "frames.usdc",
     "lift": "bodice.obj",
     "runmetrics": "metrics.json",
@@ -139,24 +122,24 @@ _SVG = b"""<?xml version="1.0"?>
 """
 
 
-def _tags(*pairs: tuple[int, object]) -> str:
+def tags(*pairs: tuple[int, object]) -> str:
     return "".join(f"{code}\n{value}\n" for code, value in pairs)
 
 
-def _dxf() -> bytes:
+def drawing() -> bytes:
     """A block of a polyline with a bulge, and lines, an arc, a circle, an ellipse and a spline beside it."""
-    ring = _tags((0, "POLYLINE"), (8, 1), (66, 1), (70, 1))
+    ring = tags((0, "POLYLINE"), (8, 1), (66, 1), (70, 1))
     for x, y, bulge in ((0, 0, 0), (400, 0, 0.2), (400, 300, 0), (0, 300, -0.1)):
-        ring += _tags((0, "VERTEX"), (8, 1), (10, x), (20, y), (42, bulge))
-    ring += _tags((0, "SEQEND"))
+        ring += tags((0, "VERTEX"), (8, 1), (10, x), (20, y), (42, bulge))
+    ring += tags((0, "SEQEND"))
     texts = "".join(
-        _tags((0, "TEXT"), (8, 1), (10, 5), (20, 5), (40, 5), (1, text))
+        tags((0, "TEXT"), (8, 1), (10, 5), (20, 5), (40, 5), (1, text))
         for text in ("PIECE NAME: B", "SIZE: M", "QUANTITY: 2", "UNITS: METRIC")
     )
-    grain = _tags((0, "LINE"), (8, 7), (10, 50), (20, 50), (11, 50), (21, 250))
-    others = _tags((0, "CIRCLE"), (8, 2), (10, 700), (20, 0), (40, 60))
-    others += _tags((0, "ARC"), (8, 2), (10, 900), (20, 0), (40, 60), (50, 10), (51, 200))
-    others += _tags(
+    grain = tags((0, "LINE"), (8, 7), (10, 50), (20, 50), (11, 50), (21, 250))
+    others = tags((0, "CIRCLE"), (8, 2), (10, 700), (20, 0), (40, 60))
+    others += tags((0, "ARC"), (8, 2), (10, 900), (20, 0), (40, 60), (50, 10), (51, 200))
+    others += tags(
         (0, "ELLIPSE"),
         (100, "AcDbEntity"),
         (8, 2),
@@ -169,39 +152,39 @@ def _dxf() -> bytes:
         (41, 0),
         (42, 6.283185307),
     )
-    others += _tags((0, "LWPOLYLINE"), (100, "AcDbEntity"), (8, 2), (100, "AcDbPolyline"), (90, 3), (70, 1))
-    others += _tags((10, 0), (20, 600), (42, 0.3), (10, 100), (20, 600), (10, 100), (20, 700))
-    others += _tags(
+    others += tags((0, "LWPOLYLINE"), (100, "AcDbEntity"), (8, 2), (100, "AcDbPolyline"), (90, 3), (70, 1))
+    others += tags((10, 0), (20, 600), (42, 0.3), (10, 100), (20, 600), (10, 100), (20, 700))
+    others += tags(
         (0, "SPLINE"), (100, "AcDbEntity"), (8, 2), (100, "AcDbSpline"), (70, 8), (71, 3), (72, 8), (73, 4), (74, 0)
     )
-    others += _tags(*((40, knot) for knot in (0, 0, 0, 0, 1, 1, 1, 1)))
-    others += "".join(_tags((10, x), (20, y), (30, 0)) for x, y in ((300, 600), (350, 700), (400, 500), (450, 600)))
-    others += _tags(
+    others += tags(*((40, knot) for knot in (0, 0, 0, 0, 1, 1, 1, 1)))
+    others += "".join(tags((10, x), (20, y), (30, 0)) for x, y in ((300, 600), (350, 700), (400, 500), (450, 600)))
+    others += tags(
         (0, "MTEXT"), (100, "AcDbEntity"), (8, 2), (100, "AcDbMText"), (10, 0), (20, 0), (1, "STYLE NAME: a")
-    ) + _tags((0, "POINT"), (8, 2), (10, 0), (20, 0))
-    insert = _tags((0, "INSERT"), (8, 1), (2, "B"), (10, 0), (20, 0))
+    ) + tags((0, "POINT"), (8, 2), (10, 0), (20, 0))
+    insert = tags((0, "INSERT"), (8, 1), (2, "B"), (10, 0), (20, 0))
     block = (
-        _tags((0, "BLOCK"), (8, 1), (2, "B"), (70, 0), (10, 0), (20, 0))
+        tags((0, "BLOCK"), (8, 1), (2, "B"), (70, 0), (10, 0), (20, 0))
         + ring
         + texts
         + grain
-        + _tags((0, "ENDBLK"), (8, 1))
+        + tags((0, "ENDBLK"), (8, 1))
     )
-    header = _tags(
+    header = tags(
         (0, "SECTION"), (2, "HEADER"), (9, "$ACADVER"), (1, "AC1015"), (9, "$INSUNITS"), (70, 4), (0, "ENDSEC")
     )
-    blocks = _tags((0, "SECTION"), (2, "BLOCKS")) + block + _tags((0, "ENDSEC"))
-    entities = _tags((0, "SECTION"), (2, "ENTITIES")) + insert + others + _tags((0, "ENDSEC"), (0, "EOF"))
+    blocks = tags((0, "SECTION"), (2, "BLOCKS")) + block + tags((0, "ENDSEC"))
+    entities = tags((0, "SECTION"), (2, "ENTITIES")) + insert + others + tags((0, "ENDSEC"), (0, "EOF"))
     return (header + blocks + entities).encode()
 
 
 @functools.cache
-def run_folder() -> dict[str, bytes]:
-    """The files of a small run, by name."""
+def in_out() -> dict[str, bytes]:
+    """The files of a small run in the folder `out`."""
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "bodice.toml").write_text(_SCENE)
         main(["run", f"{folder}/bodice.toml", "--out", f"{folder}/out", "--quiet"])
-        return {file.name: file.read_bytes() for file in (Path(folder) / "out").iterdir()}
+        return {f"out/{file.name}": file.read_bytes() for file in (Path(folder) / "out").iterdir()}
 
 
 @functools.cache
@@ -298,100 +281,22 @@ def _moved_marks(random: Random, pattern: Any) -> Any:
 
 
 def _seeds(kind: str) -> tuple[bytes, ...]:
-    if kind in _MEMBERS:
-        return (run_folder()[_MEMBERS[kind]],)
+    if kind in MEMBERS:
+        return (in_out()[f"out/{MEMBERS[kind]}"],)
     if kind in ("dxf", "svg"):
-        return run_folder()[f"bodice.{kind}"], *((_dxf(), _dxf()) if kind == "dxf" else (_SVG, _FREESEWING))
+        return in_out()[f"out/bodice.{kind}"], *((drawing(), drawing()) if kind == "dxf" else (_SVG, _FREESEWING))
     if kind == "worn":
         return (_worn(),)
     return {"sewing": (_SEWING.encode(),), "garmentcode": (json.dumps(_GARMENTCODE).encode(),), "rul": (_RUL,)}[kind]
 
 
-def foreign_case(kind: str, random: Random) -> Case:
-    """A damaged seed of one of these kinds, and a command that reads it."""
-    from .mutations import damaged_bytes, damaged_json, damaged_toml
-
+def damaged_foreign(kind: str, random: Random) -> bytes:
+    """A damaged seed of one of these kinds."""
     seed = random.choice(_seeds(kind))
     if kind == "sewing":
-        content = damaged_toml(random, seed.decode())
-    elif kind == "worn" and random.randrange(4):
-        content = json.dumps(_moved_marks(random, json.loads(seed))).encode()
-    elif kind in ("garmentcode", "runmetrics", "runpattern", "worn"):
-        content = damaged_json(random, json.loads(seed))
-    else:
-        content = damaged_bytes(random, seed)
-    return random.choice(foreign_cases_of_file(kind, content))
-
-
-def foreign_cases_of_file(kind: str, content: bytes, *, name: str = "odd", refused: bool | None = None) -> list[Case]:
-    """The cases that read a file of one of these kinds."""
-
-    def case(arguments: tuple[str, ...], files: dict[str, bytes], subject: str, replaces: str = "") -> Case:
-        return Case(kind, files, arguments, subject, None, name=name, refused=refused, seconds=60.0, replaces=replaces)
-
-    if kind in _MEMBERS:
-        member = f"out/{_MEMBERS[kind]}"
-        files = {f"out/{file}": data for file, data in run_folder().items()} | {member: content}
-        review = case(("review", "out", "--quiet"), files, member, "*")
-        export = case(("export", "out", "--format", "svg", "--format", "dxf", "--quiet"), files, member, "*")
-        drape = case(("drape", "out", "--edges"), files, member)
-        return {"frames": [review], "lift": [drape], "runmetrics": [review, export], "runpattern": [export, drape]}[
-            kind
-        ]
-    file = name + next(ending for ending, of in FOREIGN_ENDINGS.items() if of == kind)
-    if kind == "sewing":
-        return [case(("drape", "p.dxf", "--seams", file, "--edges"), {"p.dxf": _dxf(), file: content}, file)]
-    if kind == "rul":
-        return [case(("drape", file), {file: content}, file)]
-    if kind == "worn":
-        drape = ("drape", file, "--body", "EU 38", "--out", "worn", "--quiet")
-        return [case(drape, {file: content}, file)]
-    listed = case(("drape", file, "--edges"), {file: content}, file)
-    formats = ("--format", "svg", "--format", "dxf", "--format", "json")
-    exported = case(("export", file, *formats, "--quiet"), {file: content}, file)
-    laid = case(("marker", file, "--seconds", "1", "--quiet"), {file: content}, file)
-    return [listed, listed, exported, laid]
-
-
-def foreign_bounds() -> Iterator[Case]:
-    """Drawings that are too much, a second of the processor for each thousand of their entities; devices in the place of files."""
-    head = _tags((0, "SECTION"), (2, "ENTITIES"))
-    star = [
-        _tags((0, "LINE"), (8, 1), (10, 0), (20, 0), (11, f"{1e3 * math.cos(k):.3f}"), (21, f"{1e3 * math.sin(k):.3f}"))
-        for k in range(10_000)
-    ]
-    circles = [_tags((0, "CIRCLE"), (8, 1), (10, k % 100 * 30), (20, k // 100 * 30), (40, 40)) for k in range(10_000)]
-    rings = [_tags((0, "CIRCLE"), (8, 1), (10, 0), (20, 0), (40, 1 + 0.01 * k)) for k in range(10_000)]
-    for name, entities in (("star of lines", star), ("chain of circles", circles), ("concentric circles", rings)):
-        content = (head + "".join(entities) + _tags((0, "ENDSEC"), (0, "EOF"))).encode()
-        yield from _too_much("dxf", content, f"dxf: a {name}", len(entities) / 1000)
-    page = '<svg xmlns="http://www.w3.org/2000/svg" width="1000mm" viewBox="0 0 1000 1000"><path d="M{} Z"/></svg>'
-    for turn, name in ((2e-5 * math.pi, "circle"), (1.0, "star")):
-        points = (f"{500 + 400 * math.cos(turn * k):.4f},{500 + 400 * math.sin(turn * k):.4f}" for k in range(100_000))
-        yield from _too_much(
-            "svg",
-            page.format(" L".join(points)).encode(),
-            f"svg: a {name} of 100,000 points",
-            100,
-            read=name == "circle",
-        )
-    for file, arguments in (
-        ("odd.dxf", ("drape", "odd.dxf", "--edges")),
-        ("odd.svg", ("drape", "odd.svg", "--edges")),
-        ("odd.toml", ("run", "odd.toml")),
-        ("odd.toml", ("batch", "odd.toml")),
-        ("odd.obj", ("flatten", "odd.obj", "--units", "m")),
-        ("odd.usda", ("flatten", "odd.usda")),
-        ("out/metrics.json", ("review", "out")),
-        ("out/pattern.json", ("export", "out", "--format", "svg")),
-        ("out/pattern.json", ("drape", "out", "--edges")),
-    ):
-        words = f"{arguments[0]}: {file} is a link to /dev/zero"
-        yield Case("device", {"out/empty": b""}, arguments, links={file: "/dev/zero"}, name=words, refused=True)
-
-
-def _too_much(kind: str, content: bytes, name: str, seconds: float, *, read: bool = False) -> Iterator[Case]:
-    """All commands read a drawing alike, so that one shows that it is too much; what is read all commands get."""
-    cases = {case.arguments: case for case in foreign_cases_of_file(kind, content)}
-    for case in list(cases.values())[: None if read else 1]:
-        yield replace(case, name=name, seconds=max(seconds, 10.0))
+        return damaged_toml(random, seed.decode())
+    if kind == "worn" and random.randrange(4):
+        return json.dumps(_moved_marks(random, json.loads(seed))).encode()
+    if kind in ("garmentcode", "runmetrics", "runpattern", "worn"):
+        return damaged_json(random, json.loads(seed))
+    return damaged_bytes(random, seed)

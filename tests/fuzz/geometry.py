@@ -5,28 +5,21 @@ from __future__ import annotations
 import functools
 import json
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from random import Random
 from typing import Any
 
 import numpy as np
+from obj_files import obj_text
+from surface_meshes import quads_between
 
-from .promise import Case
+from . import seeds
+from .damage import damaged_bytes, damaged_json, damaged_toml, little_work
+from .promise import Case, words
+from .seeds import BARE
 
-__all__ = ["GEOMETRY_SHARES", "garment_meshes", "geometry_case"]
-
-GEOMETRY_SHARES = {
-    "form": 3,
-    "finishing": 2,
-    "tables": 6,
-    "pieces": 6,
-    "open": 4,
-    "garment": 4,
-    "islands": 5,
-    "body": 2,
-    "worn": 2,
-}
-"""How many of a hundred cases, or so, are of which kind: a form takes seconds."""
+__all__ = ["geometry_case"]
 
 _QUIET = "[output]\nframes = 0\npicture = false\nreview = false\n"
 _BODY = "[mannequin]\nsize = 'EU 40'\nresolution_mm = 40\n[relax]\nmax_steps = 30\n"
@@ -70,13 +63,9 @@ _SURFACES = (
 )
 
 
-def _obj(parts: list[tuple[str, Any, Any]]) -> bytes:
-    rows, before = list[str](), 1
-    for name, points, quads in parts:
-        rows += [f"o {name}", *(f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points)]
-        rows += ["f " + " ".join(str(before + int(k)) for k in quad) for quad in quads]
-        before += len(points)
-    return "\n".join([*rows, ""]).encode()
+def _obj(*parts: tuple[str, Any, Any]) -> bytes:
+    """The OBJ file of parts: name, vertices and faces of each."""
+    return obj_text(*(part[1:] for part in parts), names=[part[0] for part in parts], digits=".6f").encode()
 
 
 @functools.cache
@@ -93,7 +82,7 @@ def garment_meshes() -> dict[str, bytes]:
     u, v = (a.ravel() for a in np.meshgrid(np.linspace(0, 0.3, 6), np.linspace(0, 0.4, 7)))
     front = np.stack([u, v, 0.05 * np.sin(np.pi * u / 0.3)], -1)
     grid = np.arange(42).reshape(7, 6)
-    sheet = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], -1).reshape(-1, 4)
+    sheet = quads_between(grid)
     back = front * [1, 1, -1]
     slipped = front + 1e-6
     cap = np.array([[-0.1, 0, 0], [0, -0.1, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.09]])
@@ -105,16 +94,14 @@ def garment_meshes() -> dict[str, bytes]:
     bent = front * [1, 1, 3]
     fin = np.stack([grid[1:-1, 2][:-1], grid[1:-1, 2][1:], np.arange(43, 47), np.arange(42, 46)], -1)
     return {
-        "thick.obj": _obj([("thick", np.vstack([bent, bent - [0, 0, 0.003]]), thick)]),
-        "fin.obj": _obj([("fin", np.vstack([front, front[grid[1:-1, 2]] + [0, 0, 0.02]]), np.vstack([sheet, fin]))]),
-        "tube.obj": _obj([("tube", tube, belt)]),
-        "pieces.obj": _obj([("front", front, sheet), ("back", back, sheet[:, ::-1])]),
-        "nearly.obj": _obj(
-            [("front", front, sheet), ("back", back[:36] * [1, 1.2, 1] - [0, 0, 4e-4], sheet[:25, ::-1])]
-        ),
-        "double.obj": _obj([("outer", front, sheet), ("inner", slipped, sheet[:, ::-1])]),
-        "doublet.obj": _obj([("cap", cap, doublet)]),
-        "folded.obj": _obj([("sheet", folded, [[0, 1, 2, 3], [2, 1, 4, 5]])]),
+        "thick.obj": _obj(("thick", np.vstack([bent, bent - [0, 0, 0.003]]), thick)),
+        "fin.obj": _obj(("fin", np.vstack([front, front[grid[1:-1, 2]] + [0, 0, 0.02]]), np.vstack([sheet, fin]))),
+        "tube.obj": _obj(("tube", tube, belt)),
+        "pieces.obj": _obj(("front", front, sheet), ("back", back, sheet[:, ::-1])),
+        "nearly.obj": _obj(("front", front, sheet), ("back", back[:36] * [1, 1.2, 1] - [0, 0, 4e-4], sheet[:25, ::-1])),
+        "double.obj": _obj(("outer", front, sheet), ("inner", slipped, sheet[:, ::-1])),
+        "doublet.obj": _obj(("cap", cap, doublet)),
+        "folded.obj": _obj(("sheet", folded, [[0, 1, 2, 3], [2, 1, 4, 5]])),
     }
 
 
@@ -154,8 +141,8 @@ def whole_garments() -> dict[str, bytes]:
             ring = new
     ball = trimesh.creation.icosphere(2, radius=0.1)
     return {
-        "trousers.obj": _obj([("trousers", points, faces)]),
-        "ball.obj": _obj([("ball", ball.vertices, ball.faces)]),
+        "trousers.obj": _obj(("trousers", points, faces)),
+        "ball.obj": _obj(("ball", ball.vertices, ball.faces)),
         "tube.obj": garment_meshes()["tube.obj"],
     }
 
@@ -254,58 +241,69 @@ def wrong_shape(random: Random, content: bytes) -> bytes:
 
 def geometry_case(kind: str, random: Random) -> Case:
     """A damaged scene or mesh of a kind, and the command that reads it."""
-    from . import seeds
-    from .mutations import _MUCH_WORK, damaged_bytes, damaged_json, damaged_toml
-    from .seeds import BARE
-
-    meshes = garment_meshes()
-    if kind in ("body", "worn"):
-        skirt, body = seeds.SKIRT, random.choice(seeds.bodies())
-        if kind == "body" or random.randrange(2):
-            body = wrong_shape(random, body)
-        else:
-            skirt = wrong_shape(random, skirt)
-        if kind == "body":
-            files, subject = {"odd.obj": body}, "odd.obj"
-            command = ["mannequin", "--scan", "odd.obj", "--units", "m", "--resolution", "40", "--out", "out", "-q"]
-        else:
-            files, subject = {"skirt.obj": skirt, "body.obj": body}, "skirt.obj"
-            command = ["fit", "skirt.obj", "--units", "m", "--to", "EU 38", "--out", "out", *seeds.BARE]
-            command += random.choice(([], ["--from", "body.obj"], ["--from", "EU 40"]))
-        leaves = "out/metrics.json" if kind == "body" else "out/fit.json"
-        return Case(kind, files, tuple(command), subject=subject, leaves=leaves, seconds=90.0)
+    if kind in ("body", "worn body"):
+        return _on_a_body(kind, random)
     if kind in ("form", "finishing", "tables"):
         texts = {"form": _FORMS, "finishing": _FINISHED, "tables": _SURFACES}[kind]
-        content = _MUCH_WORK.sub(rb"\g<1>5", damaged_toml(random, random.choice(texts)))
-        files = {**meshes, "odd.scene.toml": content}
+        content = little_work(damaged_toml(random, random.choice(texts)))
         seconds = 120.0 if b"mannequin" in content else 40.0
-        run = ("run", "odd.scene.toml", "--out", "out", "--quiet")
-        return Case(kind, files, run, subject="odd.scene.toml", leaves="out/metrics.json", seconds=seconds)
+        return _read(kind, "run FILE --out out --quiet", "odd.scene.toml", content, garment_meshes(), seconds=seconds)
     if kind == "islands":
         ending, seed = random.choice(list(meshes_with_seams().items()))
-        units = ("--units", "m") if ending == "obj" else ()
+        units = "--units m" if ending == "obj" else ""
         how = random.choice(("uv", "materials", "groups", "file", "auto"))
-        command = ["flatten", f"odd.{ending}", *units, "--seams", how, "--max-steps", "30", "--out", "out", *BARE]
         if ending == "gltf" and random.randrange(2):
             content = damaged_json(random, json.loads(seed))
         else:
             content = damaged_bytes(random, seed)
-        file = f"odd.{ending}"
-        return Case(kind, {file: content}, tuple(command), subject=file, leaves="out/metrics.json", seconds=40.0)
-    name = random.choice(list(meshes))
-    command = ["flatten", "odd.obj", "--units", random.choice(("m", "m", "cm")), "--out", "out", *BARE]
+        command = f"flatten FILE {units} --seams {how} --max-steps 30 --out out {BARE}"
+        return _read(kind, command, f"odd.{ending}", content)
+    meshes = whole_garments() if kind == "garment" else garment_meshes()
+    name = random.choice(list(garment_meshes()))
+    command = f"flatten FILE --units {random.choice(('m', 'm', 'cm'))} --out out {BARE} "
     if kind == "garment":
-        meshes = whole_garments()
         name = random.choice(list(meshes))
-        command += ["--seams", "auto", "--fabric", "woven", "--max-steps", "30"]
-        command += random.choice(([], ["--front", "-z"], ["--up", "+z"], ["--no", "dart"], ["--limit", "1"]))
+        command += "--seams auto --fabric woven --max-steps 30 "
+        command += random.choice(("", "--front -z", "--up +z", "--no dart", "--limit 1"))
     elif kind == "pieces":
-        command += ["--component", "all", *random.choice(([], [], ["--meet", "0"], ["--meet", "10"]))]
+        command += "--component all " + random.choice(("", "", "--meet 0", "--meet 10"))
     else:
         name = random.choice(("tube.obj", name))
         ends = [random.choice((random.randrange(84), 0, 72, 10**6)) for _ in range(2)]
-        command += ["--open", ",".join(map(str, ends))]
-    content = damaged_bytes(random, meshes[name])
+        command += f"--open {ends[0]},{ends[1]}"
     # A wrong vertex of --open is a fault of the command line.
-    subject = "" if kind == "open" else "odd.obj"
-    return Case(kind, {"odd.obj": content}, tuple(command), subject=subject, leaves="out/metrics.json", seconds=40.0)
+    return _read(kind, command, "odd.obj", damaged_bytes(random, meshes[name]), is_named=kind != "open")
+
+
+def _read(
+    kind: str,
+    command: str,
+    file: str,
+    content: bytes,
+    beside: Mapping[str, bytes] | None = None,
+    *,
+    seconds: float = 40.0,
+    is_named: bool = True,
+) -> Case:
+    """The case of a command that reads a FILE of a content."""
+    files, subject = {**(beside or {}), file: content}, file if is_named else ""
+    return Case(
+        kind, files, words(command.replace("FILE", file)), subject=subject, leaves="out/metrics.json", seconds=seconds
+    )
+
+
+def _on_a_body(kind: str, random: Random) -> Case:
+    """A body that is scanned, or one with a skirt on it; one of both is of a wrong shape."""
+    skirt, body = seeds.SKIRT, random.choice(seeds.bodies())
+    if kind == "body" or random.randrange(2):
+        body = wrong_shape(random, body)
+    else:
+        skirt = wrong_shape(random, skirt)
+    if kind == "body":
+        return _read(
+            kind, "mannequin --scan FILE --units m --resolution 40 --out out -q", "odd.obj", body, seconds=90.0
+        )
+    command = f"fit skirt.obj --units m --to 'EU 38' --out out {BARE} "
+    command += random.choice(("", "--from body.obj", "--from 'EU 40'"))
+    files = {"skirt.obj": skirt, "body.obj": body}
+    return Case(kind, files, words(command), subject="skirt.obj", leaves="out/fit.json", seconds=90.0)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import functools
 import json
+import math
 import resource
 import signal
 import tempfile
@@ -13,12 +13,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from obj_files import obj_text
+from surface_meshes import grid
 
-from .foreign_files import foreign_bounds
-from .mutations import DIGITS, NAMES
-from .promise import Case, Environment
+from .damage import DIGITS, NAMES
+from .foreign_files import tags
+from .kinds import cases_of_file
+from .promise import CLOTH, Case, Environment, words
 from .regressions import cases_of, regression_files
-from .seeds import BARE, CLOTH, FABRIC, METRICS, SCENES, SHORT, bodies, case_of_file, meshes, pattern
+from .seeds import BARE, FABRIC, METRICS, SCENES, SHORT, bodies, meshes, pattern
 
 __all__ = ["GROUPS", "known_faults"]
 
@@ -36,50 +39,35 @@ def known_faults() -> Iterator[Case]:
     yield from _environments()
 
 
-@functools.cache
 def _grid(columns: int) -> bytes:
     """A gently curved square sheet as OBJ."""
-    u, v = (a.ravel() for a in np.meshgrid(np.linspace(0, 1, columns), np.linspace(0, 1, columns)))
-    i = np.arange(columns * columns).reshape(columns, columns) + 1
-    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
-    lines = [f"v {x:.6f} {y:.6f} {0.1 * x * (1 - x) * y:.6f}" for x, y in zip(u, v, strict=True)]
-    return "\n".join([*lines, *("f " + " ".join(map(str, quad)) for quad in quads.tolist()), ""]).encode()
+    sheet = grid(columns, columns, lambda x, y: np.stack([x, y, 0.1 * x * (1 - x) * y], axis=-1))
+    return obj_text(sheet, digits=".6f").encode()
 
 
 def _named(kind: str, content: bytes | str, name: str, **more: Any) -> Iterator[Case]:
     """The cases of a file, under the name of the fault."""
     data = content.encode() if isinstance(content, str) else content
-    for case in case_of_file(kind, data, **more):
+    for case in cases_of_file(kind, data, **more):
         yield replace(case, name=name if case.arguments[0] != "fabrics" else f"{name} (listed)")
 
 
 def _inputs_replaced() -> Iterator[Case]:
     """Runs whose files would have the name of what they read."""
-    beside = ("--units", "cm", "--out", ".")
     obj, usd = {"front.obj": CLOTH}, {"frames.usdc": meshes("usdc")[0]}
     scene = SCENES["file"].replace("fabric_files = ['own.toml']\n", "").replace("'own'", "'woven'").encode()
-    yield Case("obj", obj, ("flatten", "front.obj", *beside, *BARE), name="flatten --out . beside its OBJ")
-    yield Case(
-        "usdc", usd, ("flatten", "frames.usdc", "--out", "."), name="flatten --out . of a frames.usdc", seconds=60
-    )
+    flatten = f"flatten front.obj --units cm {BARE} --out"
+    yield Case("obj", obj, words(f"{flatten} ."), name="flatten --out . beside its OBJ")
+    yield Case("usdc", usd, words("flatten frames.usdc --out ."), name="flatten --out . of a frames.usdc", seconds=60)
     named = {"cloth.obj": CLOTH, "cloth.toml": scene}
-    yield Case("scene", named, ("run", "cloth.toml", "--out", "."), name="run --out . beside its mesh")
-    linked = {"store/front.obj": CLOTH}
-    in_out = Case(
-        "obj",
-        linked,
-        ("flatten", "front.obj", "--units", "cm", "--out", "store", *BARE),
-        name="input is a link into --out",
-    )
-    yield replace(in_out, links={"front.obj": "store/front.obj"})
-    out_of = Case(
-        "obj",
-        obj,
-        ("flatten", "front.obj", "--units", "cm", "--out", "out", *BARE),
-        name="--out holds a link to the input",
-    )
-    yield replace(out_of, links={"out/front.obj": "../front.obj"})
-    yield replace(out_of, links={"out": "."}, name="--out is a link to the input's folder")
+    yield Case("scene", named, words("run cloth.toml --out ."), name="run --out . beside its mesh")
+    linked, there = {"store/front.obj": CLOTH}, {"front.obj": "store/front.obj"}
+    yield Case("obj", linked, words(f"{flatten} store"), links=there, name="input is a link into --out")
+    for links, name in (
+        ({"out/front.obj": "../front.obj"}, "--out holds a link to the input"),
+        ({"out": "."}, "--out is a link to the input's folder"),
+    ):
+        yield Case("obj", obj, words(f"{flatten} out"), links=links, name=name)
 
 
 def _patterns() -> Iterator[Case]:
@@ -185,34 +173,15 @@ def _meshes() -> Iterator[Case]:
         yield from _named("obj", big, f"obj: a vertex at 1e{power}")
     ball = _nearly_closed()
     # In one piece: cut at seams it is not nearly closed any more.
-    whole = (
-        "flatten",
-        "odd.obj",
-        "--units",
-        "m",
-        "--out",
-        "out",
-        "--seams",
-        "none",
-        "--frames",
-        "10",
-        "--no-picture",
-        "-q",
-    )
-    yield Case(
-        "obj",
-        {"odd.obj": ball},
-        (*whole, "--max-steps", "50"),
-        leaves="out/metrics.json",
-        name="obj: nearly closed, with frames",
-        seconds=60,
-    )
+    command = words("flatten odd.obj --units m --out out --seams none --frames 10 --no-picture -q --max-steps 50")
+    name = "obj: nearly closed, with frames"
+    yield Case("obj", {"odd.obj": ball}, command, leaves="out/metrics.json", name=name, seconds=60)
 
 
 def _disc(corners: int) -> bytes:
     angle = 2 * np.pi * np.arange(corners) / corners
-    rows = [f"v {x:.9f} {y:.9f} 0" for x, y in zip(np.cos(angle), np.sin(angle), strict=True)]
-    return "\n".join([*rows, "f " + " ".join(map(str, range(1, corners + 1))), ""]).encode()
+    points = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1)
+    return obj_text((points, [range(corners)])).encode()
 
 
 def _nearly_closed() -> bytes:
@@ -220,8 +189,7 @@ def _nearly_closed() -> bytes:
     import trimesh
 
     ball = trimesh.creation.icosphere(subdivisions=1, radius=0.2)
-    text: str = trimesh.Trimesh(ball.vertices, ball.faces[1:], process=False).export(file_type="obj")
-    return text.encode()
+    return obj_text((ball.vertices, ball.faces[1:])).encode()
 
 
 def _usd_files() -> Iterator[Case]:
@@ -248,7 +216,7 @@ def _command_lines() -> Iterator[Case]:
     """Options."""
 
     def flatten(name: str, *options: str, **more: Any) -> Case:
-        arguments = ("flatten", "cloth.obj", "--units", "m", *BARE, *options)
+        arguments = ("flatten", "cloth.obj", "--units", "m", *BARE.split(), *options)
         return Case("arguments", {"cloth.obj": CLOTH}, arguments, name=name, **more)
 
     yield flatten("--out of 300 letters", "--out", "a" * 300, refused=True)
@@ -261,11 +229,55 @@ def _command_lines() -> Iterator[Case]:
     yield Case("arguments", {}, ("flatten", "--help"), name="flatten --help names OFF", says="OFF")
 
 
+def _bounds() -> Iterator[Case]:
+    """Drawings that are too much, a second of the processor for each thousand of their entities; devices in the place of files."""
+    head = tags((0, "SECTION"), (2, "ENTITIES"))
+    star = [
+        tags((0, "LINE"), (8, 1), (10, 0), (20, 0), (11, f"{1e3 * math.cos(k):.3f}"), (21, f"{1e3 * math.sin(k):.3f}"))
+        for k in range(10_000)
+    ]
+    circles = [tags((0, "CIRCLE"), (8, 1), (10, k % 100 * 30), (20, k // 100 * 30), (40, 40)) for k in range(10_000)]
+    rings = [tags((0, "CIRCLE"), (8, 1), (10, 0), (20, 0), (40, 1 + 0.01 * k)) for k in range(10_000)]
+    for name, entities in (("star of lines", star), ("chain of circles", circles), ("concentric circles", rings)):
+        content = (head + "".join(entities) + tags((0, "ENDSEC"), (0, "EOF"))).encode()
+        yield from _too_much("dxf", content, f"dxf: a {name}", len(entities) / 1000)
+    page = '<svg xmlns="http://www.w3.org/2000/svg" width="1000mm" viewBox="0 0 1000 1000"><path d="M{} Z"/></svg>'
+    for turn, name in ((2e-5 * math.pi, "circle"), (1.0, "star")):
+        points = (f"{500 + 400 * math.cos(turn * k):.4f},{500 + 400 * math.sin(turn * k):.4f}" for k in range(100_000))
+        yield from _too_much(
+            "svg",
+            page.format(" L".join(points)).encode(),
+            f"svg: a {name} of 100,000 points",
+            100,
+            read=name == "circle",
+        )
+    for file, arguments in (
+        ("odd.dxf", ("drape", "odd.dxf", "--edges")),
+        ("odd.svg", ("drape", "odd.svg", "--edges")),
+        ("odd.toml", ("run", "odd.toml")),
+        ("odd.toml", ("batch", "odd.toml")),
+        ("odd.obj", ("flatten", "odd.obj", "--units", "m")),
+        ("odd.usda", ("flatten", "odd.usda")),
+        ("out/metrics.json", ("review", "out")),
+        ("out/pattern.json", ("export", "out", "--format", "svg")),
+        ("out/pattern.json", ("drape", "out", "--edges")),
+    ):
+        words = f"{arguments[0]}: {file} is a link to /dev/zero"
+        yield Case("device", {"out/empty": b""}, arguments, links={file: "/dev/zero"}, name=words, refused=True)
+
+
+def _too_much(kind: str, content: bytes, name: str, seconds: float, *, read: bool = False) -> Iterator[Case]:
+    """All commands read a drawing alike, so that one shows that it is too much; what is read all commands get."""
+    cases = {case.arguments: case for case in cases_of_file(kind, content)}
+    for case in list(cases.values())[: None if read else 1]:
+        yield replace(case, name=name, seconds=max(seconds, 10.0))
+
+
 def _environments() -> Iterator[Case]:
     """What surrounds the process."""
     nowhere = str(Path(tempfile.gettempdir()) / "warpflat-fuzz-kernels")
     flatten = ("flatten", "cloth.obj", "--units", "m", "--out", "out", "--quiet")
-    small = Case("environment", {"cloth.obj": CLOTH}, (*flatten, *BARE), leaves="out/metrics.json", seconds=120)
+    small = Case("environment", {"cloth.obj": CLOTH}, (*flatten, *BARE.split()), leaves="out/metrics.json", seconds=120)
 
     def around(name: str, of: Case = small, **more: Any) -> Case:
         return replace(of, name=name, environment=Environment(**more))
@@ -287,20 +299,11 @@ def _environments() -> Iterator[Case]:
         within = {resource.RLIMIT_FSIZE: limit * KILOBYTE}
         yield around(f"ulimit -f {limit}, a fresh folder", refused, limits=within)
         yield around(f"ulimit -f {limit}, an earlier run's folder", _over(refused, old), limits=within)
-    big = replace(framed, files={"cloth.obj": _grid(316)}, arguments=(*flatten, *BARE, "--max-steps", "2"), seconds=300)
-    for kilobytes in (
-        300_000,
-        500_000,
-        700_000,
-        900_000,
-        1_100_000,
-        1_200_000,
-        1_300_000,
-        1_500_000,
-        1_750_000,
-        2_000_000,
-    ):
-        yield around(f"ulimit -v {kilobytes:,}", big, limits={resource.RLIMIT_AS: kilobytes * KILOBYTE})
+    big = replace(
+        framed, files={"cloth.obj": _grid(316)}, arguments=(*flatten, *BARE.split(), "--max-steps", "2"), seconds=300
+    )
+    for megabytes in (300, 500, 700, 900, 1100, 1200, 1300, 1500, 1750, 2000):
+        yield around(f"ulimit -v {megabytes}000", big, limits={resource.RLIMIT_AS: 1000 * megabytes * KILOBYTE})
     for number in (signal.SIGINT, signal.SIGTERM):
         for seconds in (0.1, 0.2, 0.4, 0.8, 1.6, 2.4, 3.2):
             yield around(f"{number.name} after {seconds} s", _over(framed, old), stop=(number, seconds))
@@ -319,6 +322,6 @@ GROUPS = {
     "meshes": _meshes,
     "usd": _usd_files,
     "command lines": _command_lines,
-    "bounds": foreign_bounds,
+    "bounds": _bounds,
 }
 """The faults that need no process of their own."""

@@ -11,6 +11,7 @@ import os
 import re
 import resource
 import select
+import shlex
 import shutil
 import signal
 import subprocess
@@ -26,13 +27,15 @@ from types import TracebackType
 
 from .snapshot import snapshot
 
-__all__ = ["Case", "Environment", "Verdict", "Worker", "broken_promise"]
+__all__ = ["CLOTH", "Case", "Environment", "Verdict", "Worker", "broken_promise", "words"]
 
 MEMORY = 2 * 1024**3
 """The most that one case may take [B]."""
 LONGEST_LINE = 2000
 """Letters of a message. A path may have 4,096, but no case has one."""
 CASES_PER_PROCESS = 500
+CLOTH = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0.2\nv 2 1 0.2\nf 1 2 3 4\nf 2 5 6 3\n"
+"""The least that can be flattened: two quads, as OBJ."""
 _INTERNAL = r": (\w*(?:Error|Exception|Interrupt|Warning|StopIteration))\b"
 """A note that names an error of Python: a fault of the program."""
 
@@ -110,6 +113,11 @@ class Verdict:
         elif extra := [line for line in self.stderr.splitlines() if not line.startswith("warpflat: ")]:
             cause += f": {extra[0][:100]}"
         return re.sub(r"-?\b(0x[0-9a-f]+|\d{5,})", "#", re.sub(r"/tmp/\S+", "PATH", cause))
+
+
+def words(command: str) -> tuple[str, ...]:
+    """The words of a command line, as a shell has them."""
+    return tuple(shlex.split(command))
 
 
 def _broken_message(case: Case, stdout: str, stderr: str) -> str:
@@ -291,7 +299,7 @@ class Worker:
             text=True,
             env={**os.environ, "WARPFLAT_THREADS": "1", "WARPFLAT_TRACEBACK": "1"},
         )
-        warm = Case("obj", {"cloth.obj": WARM}, ("flatten", "cloth.obj", "--units", "m", "--out", "out"), seconds=300)
+        warm = Case("obj", {"cloth.obj": CLOTH}, words("flatten cloth.obj --units m --out out"), seconds=300)
         self.run(warm)  # compiles and loads the kernels, which no case shall pay for
         assert self._process is not None
         return self._process
@@ -304,9 +312,6 @@ class Worker:
                 if pipe is not None:
                     pipe.close()
         self._process = None
-
-
-WARM = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0.2\nv 2 1 0.2\nf 1 2 3 4\nf 2 5 6 3\n"
 
 
 def _run_apart(place: _Place) -> Verdict:

@@ -1,6 +1,6 @@
 """The regression files: each a past failure, in tests/regressions, run by its name.
 
-NAME.obj, .ply, .stl, .off, .glb, .gltf, .usd, .usda, .usdc, .usdz   flattened
+NAME.obj, .ply, .stl, .off, .glb, .gltf, .usda, .usdc, .usdz   flattened
 NAME.scene.toml                                                      run
 NAME.fabric.toml                                                     listed, and flattened with
 NAME.pattern.json                                                    exported in all formats
@@ -23,30 +23,18 @@ NAME.refused.obj must be refused, NAME.accepted.obj must not. `NAME.obj.gz` is u
 from __future__ import annotations
 
 import gzip
+import json
 from importlib.util import find_spec
 from pathlib import Path
 
 from .folders import unpacked
-from .foreign_files import FOREIGN_ENDINGS, foreign_cases_of_file
+from .kinds import FILE_KINDS, case_of_arguments, cases_of_file
 from .promise import Case
-from .seeds import MESHES, case_of_file
 from .studio_messages import attack_case
 
 __all__ = ["REGRESSIONS", "cases_of", "regression_files"]
 
 REGRESSIONS = Path(__file__).resolve().parents[1] / "regressions"
-_TWO_ENDINGS = {
-    ".scene.toml": "scene",
-    ".fabric.toml": "fabric",
-    ".pattern.json": "pattern",
-    ".metrics.json": "metrics",
-    ".scan.obj": "scan",
-    ".fit.obj": "fit",
-    ".sewn.obj": "sewn",
-    ".arguments.json": "arguments",
-    ".studio.json": "studio",
-    **FOREIGN_ENDINGS,
-}
 
 
 def cases_of(file: Path) -> list[Case]:
@@ -56,14 +44,17 @@ def cases_of(file: Path) -> list[Case]:
         content, name = gzip.decompress(content), name.removesuffix(".gz")
     if name.endswith(".folder.json"):
         return [unpacked(content)]
-    kind = next((kind for ending, kind in _TWO_ENDINGS.items() if name.endswith(ending)), name.rpartition(".")[2])
-    if kind not in (*MESHES, "usd", *_TWO_ENDINGS.values()):
-        raise ValueError(f"{file}: the name tells no kind; see {__name__}")
     refused = True if ".refused." in name else False if ".accepted." in name else None
-    if kind == "studio":
+    if name.endswith(".arguments.json"):
+        return [case_of_arguments(json.loads(content), name=name.partition(".")[0], refused=refused)]
+    if name.endswith(".studio.json"):
         return [attack_case(content, refused=refused)]
-    read = foreign_cases_of_file if kind in FOREIGN_ENDINGS.values() else case_of_file
-    return read(kind, content, name=name.partition(".")[0], refused=refused)
+    # ".scan.obj" before ".obj".
+    kinds = [kind for kind, ending in FILE_KINDS.items() if name.endswith(ending)]
+    if not kinds:
+        raise ValueError(f"{file}: the name tells no kind; see {__name__}")
+    kind = max(kinds, key=lambda kind: len(FILE_KINDS[kind]))
+    return cases_of_file(kind, content, name=name.partition(".")[0], refused=refused)
 
 
 def regression_files() -> list[Path]:

@@ -1,4 +1,4 @@
-"""Small valid files of every format that the command line reads, and the case that runs a file of each."""
+"""Small valid files of every format that is ours or that meshes have, and command lines."""
 
 from __future__ import annotations
 
@@ -11,15 +11,19 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from surface_meshes import quads_between
+
 from warpflat.app.cli.main import main
 from warpflat.core.output import seal_of
 
-from .promise import Case
+from .promise import CLOTH, words
 
-__all__ = ["COMMANDS", "FABRIC", "KINDS", "SCENES", "SEWN", "case_of_file", "meshes", "pattern"]
+__all__ = [
+    "BARE", "COMMANDS", "FABRIC", "MESHES", "METRICS", "SCENES", "SEWN", "SKIRT", "beside_commands", "bodies", "meshes", "pattern",
+    "record",
+]  # fmt: skip
 
-BARE = ("--frames", "0", "--no-picture", "--quiet")
-CLOTH = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0.2\nv 2 1 0.2\nf 1 2 3 4\nf 2 5 6 3\n"
+BARE = "--frames 0 --no-picture --quiet"
 # A tube of 7 by 12 faces around the hip of a body that stands at the origin.
 SKIRT = b"".join(
     [
@@ -103,144 +107,27 @@ METRICS = {
     "files": {"cloth": {"cloth.obj": "0" * 64, "old.svg": "1" * 64}},
 }
 MESHES = ("obj", "ply", "stl", "off", "glb", "gltf", "usda", "usdc", "usdz")
-KINDS = (*MESHES, "scene", "fabric", "pattern", "metrics", "scan", "fit", "sewn")
-COMMANDS = (
-    ("flatten", "cloth.obj", "--units", "cm", "--fabric", "denim", "--out", "out", *BARE),
-    ("flatten", "cloth.obj", "--units", "m", "--name", "front", "--datum", "0,3", "--model", "membrane", *BARE),
-    ("flatten", "cloth.obj", "--units", "m", "--solver", "paper", "--max-steps", "50", "--stretch-warp", "0.1", *BARE),
-    (
-        "flatten",
-        "cloth.obj",
-        "--units",
-        "m",
-        "--fabric",
-        "own",
-        "--fabric-file",
-        "own.toml",
-        "--grain-angle",
-        "45",
-        *BARE,
-    ),
-    (
-        "flatten",
-        "cloth.obj",
-        "--units",
-        "m",
-        "--seams",
-        "none",
-        "--cut-seam",
-        "plane:0.5,0,0 1,0,0",
-        "--keep",
-        "waist",
-        *BARE,
-    ),
-    (
-        "fit",
-        "skirt.obj",
-        "--units",
-        "m",
-        "--from",
-        "EU 38",
-        "--to",
-        "EU 40",
-        "--ease",
-        "hip=4cm",
-        "--out",
-        "out",
-        *BARE,
-    ),
-    ("run", "cap.scene.toml", "--out", "out", "--quiet"),
-    ("fabrics", "--file", "own.toml", "own", "--json"),
-    ("export", "done", "--format", "svg", "--format", "dxf", "--dialect", "astm", "--paper", "A4"),
-    ("export", "done", "--format", "json", "--size", "EU 38"),
-    ("mannequin", "--measure", "waist=0.76", "--size", "EU 38", "--resolution", "40", "--out", "out"),
-    ("cuts", "cap.scene.toml", "--by", "per_cm", "--out", "out"),
-    ("compare", "cap.scene.toml", "--fabric", "denim", "--fabric", "jersey", "--out", "out"),
-)
+COMMANDS = [
+    words(each)
+    for each in (
+        f"flatten cloth.obj --units cm --fabric denim --out out {BARE}",
+        f"flatten cloth.obj --units m --name front --datum 0,3 --model membrane {BARE}",
+        f"flatten cloth.obj --units m --solver paper --max-steps 50 --stretch-warp 0.1 {BARE}",
+        f"flatten cloth.obj --units m --fabric own --fabric-file own.toml --grain-angle 45 {BARE}",
+        f"flatten cloth.obj --units m --seams none --cut-seam 'plane:0.5,0,0 1,0,0' --keep waist {BARE}",
+        f"fit skirt.obj --units m --from 'EU 38' --to 'EU 40' --ease hip=4cm --out out {BARE}",
+        "run cap.scene.toml --out out --quiet",
+        "fabrics --file own.toml own --json",
+        "export done --format svg --format dxf --dialect astm --paper A4",
+        "export done --format json --size 'EU 38'",
+        "mannequin --measure waist=0.76 --size 'EU 38' --resolution 40 --out out",
+        "cuts cap.scene.toml --by per_cm --out out",
+        "compare cap.scene.toml --fabric denim --fabric jersey --out out",
+    )
+]
 
 
-def case_of_file(kind: str, content: bytes, *, name: str = "odd", refused: bool | None = None) -> list[Case]:
-    """The cases that read a file of a kind, each with the files that it needs beside it.
-
-    Args:
-        kind: one of KINDS; "usd" too, and "arguments" for a JSON list, the command line itself.
-        content: of the file.
-        name: of the file, without its ending.
-        refused: whether it must be refused, or must not.
-    """
-    file = f"{name}.{kind}" if kind in (*MESHES, "usd") else f"{name}.{kind}.toml"
-    flatten = ("flatten", "cloth.obj", "--units", "m", "--out", "out", *BARE)
-    plain = {"cloth.obj": CLOTH, "own.toml": FABRIC.encode()}
-
-    def case(arguments: tuple[str, ...], files: dict[str, bytes], **more: Any) -> Case:
-        return Case(kind, files, arguments, name=name, refused=refused, **{"leaves": "out/metrics.json", **more})
-
-    if kind in (*MESHES, "usd"):
-        units = () if kind.startswith(("usd", "gl")) else ("--units", "m")
-        return [case(("flatten", file, *units, "--out", "out", *BARE), {file: content}, subject=file)]
-    if kind == "scene":
-        slow = 90.0 if b"mannequin" in content else 20.0
-        return [case(("run", file, "--out", "out", "--quiet"), {**plain, file: content}, subject=file, seconds=slow)]
-    if kind == "fabric":
-        listed = case(("fabrics", "--file", file), {file: content}, subject=file, leaves=None)
-        used = case((*flatten, "--fabric-file", file, "--fabric", "own"), {**plain, file: content})
-        return [listed, used]
-    if kind == "pattern":
-        formats = (
-            "--format",
-            "dxf",
-            "--format",
-            "svg",
-            "--format",
-            "pdf",
-            "--format",
-            "json",
-            "--format",
-            "garmentcode",
-            "--format",
-            "plt",
-        )
-        return [
-            case(
-                ("export", "out", *formats, "--quiet"),
-                {"out/pattern.json": content, "out/metrics.json": _record({"pattern.json": content})},
-                leaves=None,
-                subject="out/pattern.json",
-                replaces="*",
-            )
-        ]
-    if kind == "metrics":
-        return [
-            case(flatten, {**plain, "out/metrics.json": content, "out/old.svg": b"<svg/>"}, replaces="out/metrics.json")
-        ]
-    if kind == "scan":
-        # A standing body is searched for limbs: it takes long.
-        scan = ("mannequin", "--scan", f"{name}.obj", "--units", "m", "--resolution", "40", "--out", "out", "--quiet")
-        return [case(scan, {f"{name}.obj": content}, subject=f"{name}.obj", seconds=90.0)]
-    if kind == "fit":
-        # A garment, and the body on which it lies: a body is fitted, which takes seconds.
-        fit = ("--units", "m", "--to", "EU 38", "--out", "out", *BARE)
-        worn = case(("fit", f"{name}.obj", *fit), {f"{name}.obj": content}, leaves="out/fit.json", seconds=90.0)
-        body = {"skirt.obj": SKIRT, f"{name}.obj": content}
-        return [
-            worn,
-            case(("fit", "skirt.obj", *fit, "--from", f"{name}.obj"), body, leaves="out/fit.json", seconds=90.0),
-        ]
-    if kind == "sewn":
-        # A worn garment whose texture is its sewn pattern: taken as it is, and its edges listed.
-        file, flat = f"{name}.obj", ("--units", "m", "--pattern", "uv", "--out", "out", *BARE)
-        return [
-            case(("flatten", file, *flat), {file: content}, subject=file),
-            case(("drape", file, "--units", "m", "--edges"), {file: content}, leaves=None, subject=file),
-        ]
-    if kind == "arguments":
-        arguments = tuple(json.loads(content))
-        replaces = "done/pattern.json" if "export" in arguments else ""
-        return [case(arguments, beside_commands(), leaves=None, replaces=replaces, seconds=90.0)]
-    raise ValueError(f"{kind}: no kind of file; one of {', '.join((*KINDS, 'usd', 'arguments'))}")
-
-
-def _record(files: dict[str, bytes]) -> bytes:
+def record(files: dict[str, bytes]) -> bytes:
     """A `metrics.json` by which files are known to be of warpflat, so that they may be replaced."""
     digests = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
     data = {"warpflat": "0", "files": {"cloth": digests}}
@@ -267,8 +154,7 @@ def meshes(kind: str) -> tuple[bytes, ...]:
     columns = 4
     u, v = (a.ravel() for a in np.meshgrid(np.linspace(0, 1, columns), np.linspace(0, 1, columns)))
     points = np.stack([u, v, 0.3 * u * (1 - u) + 0.2 * v * (1 - v)], axis=1).round(6)
-    i = np.arange(columns * columns).reshape(columns, columns)
-    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    quads = quads_between((columns, columns))
     if kind.startswith("usd"):
         return _usd(kind, points, quads)
     mesh = trimesh.Trimesh(points, np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]), process=False)

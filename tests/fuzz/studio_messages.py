@@ -21,6 +21,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+from .damage import DEEP, damaged_bytes, damaged_structure
 from .promise import Case
 
 __all__ = ["CAMERA", "Studio", "attack_case", "random_attack", "run_attack"]
@@ -92,8 +93,6 @@ def random_attack(random: Random) -> Case:
 
 
 def _request(random: Random) -> dict[str, Any]:
-    from .mutations import damaged_bytes
-
     path = "/@token@/" if random.randrange(3) else random.choice(PATHS)
     host = (
         random.choice(HOSTS) if random.randrange(2) else random.choice(("127.0.0.1", "localhost", "[::1]")) + ":@port@"
@@ -112,8 +111,6 @@ def _request(random: Random) -> dict[str, Any]:
 
 def _messages(random: Random) -> dict[str, Any]:
     import msgspec
-
-    from .mutations import damaged_bytes, damaged_structure
 
     label, value = random.choice(list(CHANGES.items()))
     change = {"type": "GuiUpdateMessage", "uuid": f"@part:{label}@", "updates": {"value": value}}
@@ -325,8 +322,6 @@ class Studio:
 
     def _encoded(self, message: Any) -> bytes:
         import msgspec
-
-        from .mutations import DEEP
 
         if isinstance(message, dict) and isinstance(message.get("bytes"), str) and len(message) == 1:
             return bytes.fromhex(message["bytes"])

@@ -14,13 +14,13 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
+from .kinds import KINDS, random_case
 from .known_faults import GROUPS
-from .mutations import SHARES, random_case
 from .promise import Case, Verdict, Worker, broken_promise
 from .regressions import cases_of, regression_files
 
 # A few of each kind; `python -m tests.fuzz` runs thousands.
-EXAMPLES = {kind: max(1, share // 6) for kind, share in SHARES.items()}
+EXAMPLES = {name: max(1, kind.share // 6) for name, kind in KINDS.items()}
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def broken(worker: Worker, case: Case) -> str:
     return f"{verdict.cause}\n{case.arguments}\n{case.files.get(case.subject)!r:.3000}\n{verdict.stderr:.3000}"
 
 
-@pytest.mark.parametrize("kind", list(SHARES))
+@pytest.mark.parametrize("kind", list(KINDS))
 def test_damaged_input_keeps_the_promise(worker: Worker, kind: str) -> None:
     @settings(
         max_examples=EXAMPLES[kind],

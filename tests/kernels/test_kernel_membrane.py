@@ -10,6 +10,7 @@ import warp as wp
 from devices import DEVICE
 from numpy.typing import NDArray
 from small_networks import corner_vertices, filled
+from surface_meshes import quads_between
 from warpflat.kernels.cells import CellForces
 from warpflat.kernels.membrane import (
     compute_membrane_energy,
@@ -149,8 +150,7 @@ def bent_quads() -> tuple[FloatArray, FloatArray]:
     points = []
     for y in rows:
         points += [[x, y] for x in np.cumsum(rng.uniform(0.03, 0.07, size=8))]
-    index = np.arange(56).reshape(7, 8)
-    faces = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
+    faces = quads_between((7, 8))
     return np.array(points), faces
 
 
@@ -162,8 +162,7 @@ def creased_quads(diagonal: int) -> tuple[FloatArray, FloatArray]:
     slide = np.where(on_line, rng.uniform(-0.2, 0.2, x.shape), 0.0)
     shift = np.where(on_line[..., None], slide[..., None], rng.uniform(-0.2, 0.2, (*x.shape, 2)))
     points = 0.03 * (np.stack([x, y], axis=-1) + shift).reshape(-1, 2)
-    index = np.arange(70).reshape(7, 10)
-    faces = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
+    faces = quads_between((7, 10))
     if diagonal:
         points[:, 0] *= -1.0
         faces = faces[:, ::-1]
@@ -417,11 +416,11 @@ def test_the_step_s_matrix_bounds_the_membrane_s_stiffness(mesh: str, name: str)
 
 
 @pytest.mark.parametrize("name", ["plain", "poisson", "soft shear"])
-def test_viscosity_is_the_rate_of_the_forces_over_a_time_step(name: str):
-    points, faces = random_triangles()
-    network = network_of(
-        make_surface(worn(points, np.eye(2), fold=False), faces), CLOTHS[name], points, grain_angle=20.0
-    )
+@pytest.mark.parametrize("mesh", ["random triangles", "bent quads"])
+def test_viscosity_is_the_rate_of_the_forces_over_a_time_step(mesh: str, name: str):
+    points, faces = random_triangles() if mesh == "random triangles" else bent_quads()
+    surface = make_surface(worn(points, np.eye(2), fold=mesh == "bent quads"), faces)
+    network = network_of(surface, CLOTHS[name], points, grain_angle=20.0)
     moving = np.random.default_rng(6).normal(size=points.shape)
     viscosity = evaluated(network, points, moving)["viscosity"]
     step = 1e-8

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from surface_meshes import quads_between
 from warpflat.kernels.unfold import measure_triangles
 
 from warpflat.core.launch import launch_each
@@ -37,7 +38,7 @@ def rolled(*, slit: bool = False) -> Surface:
     along, across = flat @ [np.cos(0.6), np.sin(0.6)], flat @ [-np.sin(0.6), np.cos(0.6)]
     body = np.column_stack([0.05 * np.sin(along / 0.05), across, 0.05 * np.cos(along / 0.05)])
     index = np.arange(400).reshape(20, 20)
-    faces = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
+    faces = quads_between(index)
     if slit:
         line = index[:9, 8]
         right = np.arange(len(faces)) % 19 >= 8

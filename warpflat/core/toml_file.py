@@ -21,7 +21,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["Table", "check_table", "read_toml"]
+__all__ = ["Table", "check_table", "in_metres", "read_toml"]
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -35,9 +35,10 @@ class Table(BaseModel):
         """Return what the file says, by its own keys; without what holds by default."""
         return self.model_dump(exclude_unset=True, by_alias=True)
 
-    def metres(self, *keys: str) -> dict[str, Any]:
-        """Return lengths [m] by name: "width" of the field `width_mm`."""
-        return {key: 1e-3 * getattr(self, f"{key}_mm") for key in keys}
+
+def in_metres(key: str) -> property:
+    """Return a property of a table: the length [m] that it has under a key in millimetres."""
+    return property(lambda table: 1e-3 * getattr(table, key))
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -61,11 +61,9 @@ from .export.dressed import dress as dress
 from .export.figure import DPI as DPI
 from .export.figure import GREY as GREY
 from .export.figure import INK as INK
-from .export.figure import PAGE_WIDTH as PAGE_WIDTH
 from .export.figure import Pen as Pen
 from .export.figure import drawn_page as drawn_page
 from .export.figure import new_figure as new_figure
-from .export.figure import on_paper as on_paper
 from .export.figure import picture_of as picture_of
 from .export.figure import write_figure as write_figure
 from .export.figure import write_moving_picture as write_moving_picture
@@ -122,7 +120,10 @@ from .export.views import View as View
 from .export.views import draw_row as draw_row
 from .export.views import make_facets as make_facets
 from .export.views import pattern_view as pattern_view
+from .export.views import row_size as row_size
 from .export.views import view_from_side as view_from_side
+from .export.views import views_around as views_around
+from .export.views import write_maps as write_maps
 from .export.walked_picture import write_walked_picture as write_walked_picture
 from .export.wear_words import RANGES as RANGES
 from .export.wear_words import STRAINS as STRAINS

@@ -30,7 +30,6 @@ from warpflat.flat.solver.options import RelaxOptions
 SCENES = Path(__file__).parents[3] / "scenes"
 PATTERN_FILES = ("cloth.dxf", "cloth.svg", "pattern.pdf", "pattern.json")
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0.2\nv 2 1 0.2\nf 1 2 3 4\nf 2 5 6 3\n"
-TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 RING = "".join(
     [f"v {x} {y} {z}\n" for z in (0, 1) for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1))]
     + [f"f {i + 1} {(i + 1) % 4 + 1} {(i + 1) % 4 + 5} {i + 5}\n" for i in range(4)]
@@ -205,28 +204,6 @@ def test_a_good_run_is_one_with_standard_error_closed_too(tmp_path: Path, closed
 # --- bad input
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        pytest.param("", "empty|no vertices|no faces", id="empty"),
-        pytest.param(SQUARE.replace("v 1 1 0", "v 1 nan 0"), "vertex 2.*not finite", id="nan"),
-        pytest.param(SQUARE + "v 1 0 1\nf 2 3 7\n", r"edge.*3 faces|non-manifold", id="non-manifold"),
-        pytest.param(SQUARE + FAR, r"2 (connected )?(parts|components)", id="two components"),
-        pytest.param(TETRAHEDRON, "no border|closed", id="no border"),
-        pytest.param(SQUARE.replace("f 1 2 3 4", "f 1 2 3 40"), "refers to vertex 40", id="index beyond"),
-        pytest.param("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "degenerate|area|nothing remains", id="no area"),
-        pytest.param("f 1 2 2\nv 0 0 0\nv 1 0 0\n", "repeated vertices|refers to", id="repeated vertices only"),
-        pytest.param(bytes(range(256)).decode("latin-1") * 20, "", id="noise"),
-    ],
-)
-def test_a_bad_mesh_is_refused_in_one_line(command: Command, text: str, message: str):
-    Path("bad.obj").write_bytes(text.encode("latin-1"))
-    told = command("flatten", "bad.obj", "--units", "m").refusal
-    assert told.startswith("bad.obj: ")
-    assert re.search(message, told), told
-    assert not list(Path("out").glob("*/*"))
-
-
 def test_components_are_chosen_by_the_option(command: Command):
     Path("two.obj").write_text(SQUARE + FAR)
     told = command("flatten", "two.obj", "--units", "m").refusal
@@ -280,13 +257,6 @@ def test_a_tube_is_cut_open_with_a_note_and_a_line_of_ones_own_is_checked(comman
     assert "it is a tube, cut open where its borders are nearest, 30.5 cm" in told
     assert command("flatten", "ring.obj", "--units", "ft", "--no-picture", "--open", "1,5")[0] == 0
     assert "no line 'back'" in command("flatten", "ring.obj", "--units", "ft", "--open", "back").refusal
-
-
-@pytest.mark.parametrize("suffix", ["ply", "stl", "glb", "usd", "usda", "usdc", "obj"])
-@pytest.mark.parametrize("content", [b"", bytes(range(255, -1, -1)) * 64], ids=["empty", "long"])
-def test_noise_in_any_format_is_refused(command: Command, suffix: str, content: bytes):
-    Path(f"noise.{suffix}").write_bytes(content)
-    assert f"noise.{suffix}" in command("flatten", f"noise.{suffix}", "--units", "m").refusal
 
 
 def test_paths_that_are_no_mesh(command: Command):
@@ -356,13 +326,6 @@ def test_impossible_stiffness_is_refused_by_name(command: Command, value: str):
     told = command("run", "cap.toml").refusal
     assert told.startswith("cap.toml: ")
     assert "stiffness_weft" in told
-
-
-def test_a_datum_that_does_not_touch_the_piece(command: Command):
-    line = "[lines.far]\nplane = { point = [9.0, 0.0, 0.0], normal = [1.0, 0.0, 0.0] }\n"
-    Path("cap.toml").write_text(f"datum = 'far'\n[surface]\nshape = 'dome'\n{line}")
-    told = command("run", "cap.toml").refusal
-    assert told.startswith("cap.toml: lines.far")
 
 
 def test_an_output_folder_that_cannot_be_written(command: Command):

@@ -7,29 +7,26 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
+from polygons import corners_of, drafted, polygon, sewn
 
 from warpflat.app.cli.main import main
-from warpflat.pattern.drafting.draft import draft_garment
-from warpflat.pattern.drafting.piece_parts import Edge
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.export.pattern_json import write_pattern_json
 from warpflat.pattern.export.read_svg import read_svg
 from warpflat.pattern.export.svg import write_svg
 
 
+def tube_of(name: str, width: float, height: float) -> DraftedGarment:
+    """Two equal rectangles and their side seams."""
+    pieces = [polygon(name, corners_of(width, height), first=1) for name in ("front", "back")]
+    seams = [sewn(f"{a}.e2", f"{b}.e4", f"side {a}") for a, b in (("front", "back"), ("back", "front"))]
+    return drafted(*pieces, seams=seams, name=name)
+
+
 @pytest.fixture
 def tube(tmp_path: Path) -> Path:
-    ring = np.array([(0.0, 0.0), (0.5, 0.0), (0.5, 0.25), (0.0, 0.25), (0.0, 0.0)])
-    edges = [Edge(name=f"e{k + 1}", points=ring[k : k + 2]) for k in range(4)]
-    sides = (("front", "back"), ("back", "front"))
-    seams = [
-        Seam(name=f"side {a}", sides=((SeamSide(piece=a, edge="e2"),), (SeamSide(piece=b, edge="e4", reversed=True),)))
-        for a, b in sides
-    ]
-    pieces = [Piece(name=name, edges=edges) for name in ("front", "back")]
-    write_svg(draft_garment(Pattern(name="tube", pieces={"": pieces}, seams=seams)), tmp_path / "tube.svg")
+    write_svg(tube_of("tube", 0.5, 0.25), tmp_path / "tube.svg")
     return tmp_path / "tube.svg"
 
 
@@ -70,6 +67,13 @@ def test_a_mistake_is_one_line(
     assert "\n" not in error
 
 
+def test_the_scan_of_a_sewing_file_starts_in_its_folder(tube: Path, capsys: pytest.CaptureFixture[str]):
+    table = tube.with_name("worn.toml")
+    table.write_text('[mannequin]\nscan = "gone.obj"\n')
+    assert main(["drape", str(tube), "--seams", str(table)]) == 2
+    assert str(tube.with_name("gone.obj")) in capsys.readouterr().err
+
+
 def test_edges_are_listed(tube: Path, capsys: pytest.CaptureFixture[str]):
     assert main(["drape", str(tube), "--edges"]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -94,15 +98,7 @@ def test_json_of_a_form_is_all_that_is_printed(tmp_path: Path):
 
 def test_a_pattern_from_a_file_is_corrected(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     """A tube of 88 cm around a hip of 96 cm, in a cloth that gives 5 %."""
-    ring = np.array([(0.0, 0.0), (0.44, 0.0), (0.44, 0.2), (0.0, 0.2), (0.0, 0.0)])
-    edges = [Edge(name=f"e{k + 1}", points=ring[k : k + 2]) for k in range(4)]
-    seams = [
-        Seam(name=f"side {a}", sides=((SeamSide(piece=a, edge="e2"),), (SeamSide(piece=b, edge="e4", reversed=True),)))
-        for a, b in (("front", "back"), ("back", "front"))
-    ]
-    pieces = [Piece(name=name, edges=edges) for name in ("front", "back")]
-    pattern = draft_garment(Pattern(name="narrow", pieces={"": pieces}, seams=seams))
-    write_pattern_json(pattern, tmp_path / "narrow.json")
+    write_pattern_json(tube_of("narrow", 0.44, 0.2), tmp_path / "narrow.json")
     table, out = tmp_path / "worn.toml", tmp_path / "out"
     table.write_text(
         'spacing_mm = 40\ntop = "hip"\n[mannequin]\nsize = "EU 38"\nresolution_mm = 40.0\n[drape]\ntolerance = 0.05\n'

@@ -38,7 +38,8 @@ PRINTING = {
 @pytest.fixture(scope="module")
 def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with what the commands need."""
-    from fuzz.seeds import CLOTH, SKIRT
+    from fuzz.promise import CLOTH
+    from fuzz.seeds import SKIRT
 
     folder = tmp_path_factory.mktemp("streams")
     (folder / "cap.toml").write_text(CAP + QUICK)

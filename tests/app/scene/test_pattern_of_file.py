@@ -12,6 +12,7 @@ import pytest
 import trimesh
 from command import Command
 from scipy.spatial import cKDTree
+from surface_meshes import quads_between
 
 from warpflat.app.scene.outside_pattern import OutsideJob
 from warpflat.garment.construction.as_cut import read_cut_pattern, worn_at
@@ -33,7 +34,7 @@ def skirt(wide: float = 1.0) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.nda
     radius = 0.15 + 0.1 * (0.4 - height)
     points, flat, quads, cut = [], [], [], []
     grid = np.arange(ROWS * COLUMNS).reshape(ROWS, COLUMNS)
-    faces = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
+    faces = quads_between(grid)
     for half, start in enumerate((-0.5 * np.pi, 0.5 * np.pi)):
         angle = start + turn
         ring = np.stack([np.sin(angle), np.zeros(COLUMNS), np.cos(angle)], axis=1)
@@ -284,8 +285,7 @@ def tube(
     angle, length = (each.ravel() for each in np.meshgrid(np.linspace(begin, end, 13), np.linspace(0.0, 0.2, 5)))
     ring = np.outer(np.cos(angle), [0.0, 0.0, 1.0]) + np.outer(np.sin(angle), side)
     points = np.array([*origin, 0.0]) + np.outer(length, along) + radius * ring
-    at = np.arange(65).reshape(5, 13)
-    quads = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], axis=-1).reshape(-1, 4)
+    quads = quads_between((5, 13), turned=True)
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     a, b, c = points[triangles].transpose(1, 0, 2)
     outward = np.einsum("ta,ta->", np.cross(b - a, c - a), (a + b + c) / 3.0 - points.mean(axis=0))

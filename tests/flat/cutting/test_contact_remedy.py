@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from devices import DEVICE
+from surface_meshes import quads_between
 
 from warpflat.flat.cutting.cut_piece import cut
 from warpflat.flat.cutting.cut_plan import CutPlan
@@ -20,8 +21,7 @@ from warpflat.flat.surface.repair.validate import make_surface
 def strip() -> Flattening:
     """A flat ring of more than a turn, on a ramp."""
     angle, radius = np.meshgrid(2.2 * np.pi * np.linspace(0, 1, 31), np.linspace(0.2, 0.1, 5), indexing="ij")
-    n = np.arange(angle.size).reshape(angle.shape)
-    faces = np.stack([n[:-1, :-1], n[1:, :-1], n[1:, 1:], n[:-1, 1:]], axis=-1).reshape(-1, 4)
+    faces = quads_between(angle.shape, turned=True)
     place = np.stack([radius * np.cos(angle), 0.015 * angle, radius * np.sin(angle)], axis=-1)
     return flatten(make_surface(place.reshape(-1, 3), faces, name="strip"), device=DEVICE)
 

@@ -323,6 +323,49 @@ def test_a_cut_from_border_to_border_leaves_two_pieces_with_names(bodice: Flatte
     assert again.flipped_faces == 0
 
 
+def test_a_part_keeps_its_grain_and_the_length_of_its_own_cuts():
+    """With a datum that was chosen, of which one part has nothing, in a cloth whose grain matters."""
+    shape = make_shape("dome", resolution=9)
+    stiff = warpflat.Fabric(
+        name="twill", stiffness_warp=28_000.0, stiffness_weft=4_400.0, shear_stiffness=300.0, areal_density=0.25
+    )
+    flat = warpflat.flatten(shape, fabric=stiff)
+    rows, off = np.arange(81).reshape(9, 9), flat.datum
+    across = rows[:, 2] if len({v % 9 for v in off}) == 1 else rows[2]
+    dart = rows[4, 8:5:-1] if across is rows[2] else rows[8:5:-1, 4]
+    whole = cut(flat, CutPlan(name="two", paths=(across, dart)))
+    for part in separate(whole):
+        (made,) = part.cuts or (None,)
+        if made is not None:
+            assert made.length == pytest.approx(warpflat.core.polyline_length(part.surface.vertices[made.paths[0]]))
+        again = warpflat.change_fabric(part, stiff)
+        assert stored(again) == pytest.approx(stored(part), rel=0.01)
+        before, after = (layout.positions - layout.positions.mean(axis=0) for layout in (part, again))
+        turn = np.angle(np.vdot(before @ [1, 1j], after @ [1, 1j]))
+        assert abs(turn) < math.radians(3)
+
+
+def test_what_is_known_of_each_face_goes_along_with_cuts_and_refinements(bodice: Flattening):
+    known = replace(bodice, close=np.arange(len(bodice.faces)) % 3 == 0)
+    parts = separate(cut(known, "centre"))
+    assert sum(part.close.sum() for part in parts) == known.close.sum()
+    assert all(0.0 <= part.fit.held <= 1.0 for part in parts)
+    across = geodesic_path(known.surface, N // 3, N * N - 2 * N // 3)
+    refined, path = refine_along(known, "across", across)
+    assert len(refined.close) == len(refined.faces) > len(known.faces)
+    parts = separate(cut(refined, CutPlan(name="across", paths=(path,))))
+    assert [len(part.development.positions) for part in parts] == [len(part.surface.vertices) for part in parts]
+
+
+def test_remedies_go_with_what_they_were_for():
+    advised = warpflat.advise(warpflat.flatten(make_shape("bodice", resolution=13), fabric="woven"))
+    assert advised.remedies
+    assert warpflat.advise(advised).notes == advised.notes
+    looser = warpflat.change_fabric(advised, "jersey")
+    assert looser.fit.within_limits
+    assert looser.remedies == warpflat.advise(looser).remedies == ()
+
+
 def test_a_doubled_vertex_is_doubled_in_the_pattern_only(bust_cut: Flattening, tmp_path: Path):
     save_piece(bust_cut, tmp_path, picture=False, frames=False)
     text = (tmp_path / "bodice.obj").read_text()
@@ -408,6 +451,8 @@ def test_the_ledger_ranks_candidates_by_what_they_release(bodice: Flattening):
     # Coarse is enough to rank: within a few per cent of the full relaxation.
     full = cut(bodice, CutPlan(name="x", paths=pair.candidate.paths))
     assert pair.released == pytest.approx(stored(bodice) - stored(full), rel=0.05)
+    widest = max(seam["opening_m"] for seam in full.measures["cuts"][0]["seams"])
+    assert pair.opening == pytest.approx(widest, rel=0.05)
 
 
 def test_cutting_by_itself_stops_when_it_is_enough(bodice: Flattening):
@@ -445,7 +490,7 @@ def test_from_peaks_at_the_border_cuts_lead_inwards():
     assert best.candidate.name.startswith("inward ")
     assert len(best.candidate.drawn) == 2
     assert best.released > 0.8 * stored(flat)
-    assert not best.overlaps
+    assert best.helps
     half_of_it = next(entry for entry in ledger.entries if entry.candidate.name.startswith("short inward"))
     assert half_of_it.length == pytest.approx(0.5 * best.length, rel=0.1)
     # The tips are four fifths of the way to the pole.
@@ -473,7 +518,7 @@ def test_a_cut_that_overlaps_is_told_and_not_made_by_itself():
     flat = warpflat.flatten(make_shape("saddle", resolution=17), fabric="interlock", datum="centre")
     ledger = make_ledger(flat)
     assert ledger.entries[0].released > 0
-    assert all(entry.overlaps and entry.angle < 0 for entry in ledger.entries)
+    assert all(not entry.helps and entry.angle < 0 for entry in ledger.entries)
     assert cut_automatically(flat, AutoCut())[0] is flat
 
 
@@ -488,3 +533,12 @@ def test_a_piece_without_energy_has_nothing_to_cut_for():
     result, ledgers = cut_automatically(flat, AutoCut(stop_below=1e-6))
     assert result is flat
     assert ledgers == ()
+
+
+def test_no_candidates_are_told_where_there_is_no_peak_either():
+    """Of a row of faces all vertices lie on the border."""
+    x, y = np.meshgrid(np.linspace(0.0, 0.2, 5), [0.0, 0.05])
+    row = np.array([[k, k + 1, k + 6, k + 5] for k in range(4)])
+    flat = warpflat.flatten(make_surface(np.stack([x, y, 0.0 * x], axis=-1).reshape(-1, 3), row, name="row"))
+    with pytest.raises(InputError, match="has no line to cut along"):
+        make_ledger(flat, candidates=())

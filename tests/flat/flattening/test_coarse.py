@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from devices import DEVICE
+from surface_meshes import quads_between
 
 from warpflat.core.errors import InputError
 from warpflat.flat.flattening import flatten_piece
@@ -25,8 +26,7 @@ def ramp(along: int, across: int) -> Surface:
     """A flat ring of more than a turn on a ramp, of triangles."""
     s, t = np.meshgrid(np.linspace(0, 1, along), np.linspace(0, 1, across), indexing="ij")
     radius, angle = 0.2 - 0.1 * t, 2.2 * np.pi * s
-    n = np.arange(s.size).reshape(s.shape)
-    quads = np.stack([n[:-1, :-1], n[1:, :-1], n[1:, 1:], n[:-1, 1:]], axis=-1).reshape(-1, 4)
+    quads = quads_between(s.shape, turned=True)
     places = np.stack([radius * np.cos(angle), 0.1 * s, radius * np.sin(angle)], axis=-1).reshape(-1, 3)
     return make_surface(places, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]), name="ramp")
 

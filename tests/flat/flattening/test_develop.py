@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from surface_meshes import quads_between
 
 from warpflat.core.errors import InputError
 from warpflat.flat.flattening.datum import choose_and_name_datum, choose_datum
@@ -91,7 +92,7 @@ def test_a_flat_sheet_folded_over_is_not_taken_as_it_lies():
     """Half of its faces would be mirrored."""
     x, y = np.meshgrid(np.linspace(-0.3, 0.4, 8), np.linspace(0, 0.4, 5))
     i = np.arange(x.size).reshape(x.shape)
-    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    quads = quads_between(i)
     surface = make_surface(np.stack([np.abs(x), y, 0.0 * x], axis=-1).reshape(-1, 3), quads)
     development = develop(surface, i[:, 0].astype(np.int32))
     assert development.method == "profiles"
@@ -320,7 +321,7 @@ def test_a_layout_that_winds_twice_is_not_taken_for_unfolded():
     x, y = columns[None] * np.cos(turns)[:, None], columns[None] * np.sin(turns)[:, None]
     z = np.broadcast_to(0.02 * turns[:, None], x.shape)
     i = np.arange(x.size).reshape(x.shape)
-    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    quads = quads_between(i)
     surface = make_surface(np.stack([x, y, z], axis=-1).reshape(-1, 3), quads, lines={"inside": i[:, 0]})
     development = develop(surface, surface.lines["inside"])
     assert mirrored(surface, development.positions) == 0
@@ -389,8 +390,7 @@ def test_the_datum_of_a_rectangle_is_parallel_to_its_sides(columns: int, cells: 
         points = np.stack([0.3 * np.sin(x / 0.3), y, 0.3 * np.cos(x / 0.3)], axis=-1)
     else:
         points = np.stack([x, y, 0.0 * x], axis=-1)
-    i = np.arange(x.size).reshape(x.shape)
-    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    quads = quads_between(x.shape)
     faces = quads if cells == "quads" else quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
     line = choose_datum(make_surface(points.reshape(-1, 3), faces))
     column = line % columns
@@ -431,8 +431,7 @@ def test_a_piece_about_as_wide_as_long_that_lies_askew_keeps_to_its_nearer_axis(
     points = np.stack([x, y, 0.0 * x], axis=-1).reshape(-1, 3) @ np.array(
         [[np.cos(angle), -np.sin(angle), 0.0], along, [0.0, 0.0, 1.0]]
     )
-    i = np.arange(x.size).reshape(x.shape)
-    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    quads = quads_between(x.shape)
     surface = make_surface(points, quads)
     line, said = choose_and_name_datum(surface)
     assert said == told
@@ -465,8 +464,7 @@ def band(
     angle, share = np.meshgrid(np.linspace(0, turn, columns + 1), np.linspace(0, 1, rows + 1), indexing="ij")
     radius = inner + (outer - inner) * share
     points = np.stack([radius * np.cos(angle), -height * share, radius * np.sin(angle)], axis=-1).reshape(-1, 3)
-    i = np.arange(len(points)).reshape(columns + 1, rows + 1)
-    quads = np.stack([i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]], axis=-1).reshape(-1, 4)
+    quads = quads_between((columns + 1, rows + 1), turned=True)
     return make_surface(points, quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3) if triangles else quads)
 
 

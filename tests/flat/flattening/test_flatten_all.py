@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from devices import DEVICE
 from scipy.spatial import cKDTree
+from surface_meshes import quads_between
 
 import warpflat
 from warpflat.core.errors import InputError
@@ -169,8 +170,7 @@ def test_a_work_limit_is_told_of_those_that_met_it():
 
 def flat_sheet() -> tuple[np.ndarray, np.ndarray]:
     across, up = np.meshgrid(np.linspace(0, 0.2, 9), np.linspace(0, 0.1, 5))
-    index = np.arange(45).reshape(5, 9)
-    faces = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
+    faces = quads_between((5, 9))
     return np.column_stack([across.ravel(), up.ravel(), np.zeros(45)]), faces
 
 

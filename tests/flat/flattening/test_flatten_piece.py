@@ -16,6 +16,7 @@ import trimesh
 from devices import DEVICE
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from surface_meshes import quads_between
 
 import warpflat
 from warpflat.app.scene.load import make_scene
@@ -192,7 +193,7 @@ def slit_cone(around: int, down: int) -> Surface:
     rows = np.stack([0.5 * slant * np.cos(turn), -np.sqrt(0.75) * slant, 0.5 * slant * np.sin(turn)], axis=-1)
     i = 1 + np.arange(turn.size).reshape(turn.shape)
     fan = [[0, a, b, -1] for a, b in pairwise(i[0].tolist())]
-    quads = np.stack([i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]], axis=-1).reshape(-1, 4)
+    quads = quads_between(i, turned=True)
     return make_surface(np.concatenate([np.zeros((1, 3)), rows.reshape(-1, 3)]), np.concatenate([fan, quads]))
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from surface_meshes import quads_between
 
 import warpflat
 from warpflat.core.arrays import FloatArray
@@ -25,7 +26,7 @@ def patch(*, triangles: bool) -> warpflat.Surface:
     u, v = np.meshgrid(np.linspace(-0.1, 0.1, n), np.linspace(-0.12, 0.12, n))
     vertices = np.stack([u, v, 3.0 * u * v + 2.0 * u**2 + 1.5 * v**2 + 8.0 * u * v * v], axis=-1).reshape(-1, 3)
     at = np.arange(n * n).reshape(n, n)
-    quads = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 4)
+    quads = quads_between(at)
     faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]) if triangles else quads
     return warpflat.make_surface(vertices, faces, lines={"middle": at[:, n // 2], "side": at[:, 0]}, name="patch")
 

@@ -15,6 +15,7 @@ import shapely
 from devices import DEVICE
 from numpy.typing import NDArray
 from obj_files import write_obj
+from surface_meshes import quads_between
 
 from warpflat.app.cli.main import main
 from warpflat.flat.cutting.cut_piece import cut
@@ -41,8 +42,7 @@ needs_data = pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: the 
 def band(place: Place, *, along: int = 41, across: int = 7) -> Surface:
     """A band of quads; `place` takes the share of its length and of its width."""
     s, t = np.meshgrid(np.linspace(0, 1, along), np.linspace(0, 1, across), indexing="ij")
-    n = np.arange(s.size).reshape(s.shape)
-    faces = np.stack([n[:-1, :-1], n[1:, :-1], n[1:, 1:], n[:-1, 1:]], axis=-1).reshape(-1, 4)
+    faces = quads_between(s.shape, turned=True)
     return make_surface(np.stack(place(s, t), axis=-1).reshape(-1, 3), faces, name="band")
 
 

@@ -10,6 +10,7 @@ import pytest
 import warpflat
 from warpflat.core.errors import InputError
 from warpflat.flat.flattening.progress import Progress
+from warpflat.flat.solver.steps import Relaxation
 
 SHAPE = warpflat.make_shape("dome", resolution=17)
 
@@ -48,6 +49,20 @@ def test_steps_by_hand_come_to_the_same_rest() -> None:
         steps[0].positions[0] = 0.0
     with pytest.raises(InputError, match="energy_every = 0"):
         warpflat.relaxation(shape, energy_every=0)
+
+
+def test_the_last_step_is_judged_by_the_steps_since_the_one_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    counts, check = [], Relaxation.check_convergence
+
+    def counted(self: Relaxation, count: int) -> object:
+        counts.append(count)
+        return check(self, count)
+
+    monkeypatch.setattr(Relaxation, "check_convergence", counted)
+    options = warpflat.RelaxOptions(max_steps=12)
+    steps = list(warpflat.relaxation(warpflat.make_shape("dome", resolution=9), relax=options, energy_every=5))
+    assert len(steps) == 13
+    assert counts == [5, 5, 2]
 
 
 def test_a_force_of_ones_own_is_balanced_by_the_cloth() -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from devices import DEVICE
 from numpy.typing import NDArray
+from surface_meshes import quads_between
 
 import warpflat
 from warpflat.app.scene.load import load_scene
@@ -169,9 +170,8 @@ def test_a_piece_far_astray_at_the_start_is_flat_in_the_end_in_cloth_soft_in_she
         "warpflat.flat.surface.laplacian.MOST_FACTORED", 0
     )  # no as-rigid iterations, as in larger pieces
     x, y = np.meshgrid(np.linspace(0, 0.4, 41), np.linspace(0, 0.2, 21))
-    i = np.arange(x.size).reshape(x.shape)
     row, column = np.divmod(np.arange(40 * 20), 40)
-    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    quads = quads_between(x.shape)
     comb = make_surface(
         np.stack([x, y, 0.02 * np.sin(15 * x)], axis=-1).reshape(-1, 3), quads[(column % 8 != 4) | (row >= 15)]
     )

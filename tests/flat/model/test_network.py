@@ -10,6 +10,7 @@ import warp as wp
 from devices import DEVICE
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
+from surface_meshes import quads_between
 from warpflat.kernels.reduce import subtract
 from warpflat.kernels.springs import compute_spring_energy
 
@@ -43,8 +44,7 @@ def cloth(*, warp: float = 1000.0, weft: float = 1000.0, shear: float = 200.0, n
 def sheet(columns: int, rows: int, hx: float, hy: float, *, split: int = 0) -> Surface:
     """A rectangle of quads in the plane z = 0, the first `split` of them cut into two triangles."""
     x, y = np.meshgrid(hx * np.arange(columns + 1), hy * np.arange(rows + 1))
-    i = np.arange(x.size).reshape(x.shape)
-    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    quads = quads_between(x.shape)
     none = np.full((split, 1), -1)
     halves = [np.hstack([quads[:split][:, corners], none]) for corners in ([0, 1, 2], [0, 2, 3])]
     faces = np.concatenate([quads[split:], *halves])
@@ -248,8 +248,7 @@ def test_quads_held_against_waves_store_nothing_of_their_shape_strained_uniforml
     """Trapezia, from 1.2 to 1.7 times as long as wide, at four tenths of K against waves."""
     x, y = np.meshgrid(np.linspace(-0.03, 0.03, 7), np.linspace(0.0, 0.09, 7))
     vertices = np.column_stack([(x * (1.0 + y)).ravel(), (y * (1.0 + 2.0 * x)).ravel(), 0.0 * x.ravel()])
-    number = np.arange(49).reshape(7, 7)
-    faces = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
+    faces = quads_between((7, 7))
     surface, flat = make_surface(vertices, faces), np.ascontiguousarray(vertices[:, :2])
     network = SpringNetwork.build(surface, cloth(shear=375.0), flat, device=DEVICE)
     hourglass = network.spring_arrays.hourglass

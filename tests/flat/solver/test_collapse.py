@@ -9,6 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
+from surface_meshes import quads_between
 
 from warpflat.flat.solver.collapse import Coarsening, _prolongation, coarsen, iterate_coarsenings
 from warpflat.flat.surface.connectivity import border_loops, components, euler_characteristic, non_manifold_vertices
@@ -25,8 +26,7 @@ FloatArray = NDArray[np.float64]
 def sheet(columns: int, rows: int, *, triangles: bool = False) -> Surface:
     """A flat rectangle of 10 mm cells."""
     x, y = np.meshgrid(0.01 * np.arange(columns), 0.01 * np.arange(rows))
-    i = np.arange(x.size).reshape(x.shape)
-    faces = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    faces = quads_between(x.shape)
     if triangles:
         none = np.full((len(faces), 1), -1)
         faces = np.concatenate([np.hstack([faces[:, k], none]) for k in ([0, 1, 2], [0, 2, 3])])
@@ -36,7 +36,7 @@ def sheet(columns: int, rows: int, *, triangles: bool = False) -> Surface:
 def numbered_grid(rows: int, columns: int, turn: int = 0, *, mirrored: bool = False) -> Surface:
     """A grid of 10 mm numbered row by row, all its faces begun at the same of their corners, wound one way or the other."""
     i = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
-    faces = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    faces = quads_between(i)
     faces = np.roll(faces[:, ::-1] if mirrored else faces, turn, axis=1)
     y, x = np.divmod(np.arange(rows * columns), columns)
     vertices = np.column_stack([0.01 * x, 0.01 * y, 0.001 * x * y])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from devices import DEVICE
+from surface_meshes import quads_between
 
 from warpflat.flat.fabric.library import find_fabric
 from warpflat.flat.flattening.harmonic_layout import harmonic_layout
@@ -23,16 +24,14 @@ NO_CUTS = np.empty(0, dtype=np.int32)
 
 def grid(columns: int, rows: int) -> tuple[np.ndarray, np.ndarray]:
     x, y = np.meshgrid(np.arange(columns) / columns, np.arange(rows) / rows, indexing="xy")
-    n = np.arange(columns * rows).reshape(rows, columns)
-    faces = np.stack([n[:-1, :-1], n[:-1, 1:], n[1:, 1:], n[1:, :-1]], axis=-1).reshape(-1, 4)
+    faces = quads_between((rows, columns))
     return np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), faces
 
 
 def arc(turns: float, *, rise: float = 0.1) -> Surface:
     """A band of radii 0.1 and 0.2 m that runs around an axis and rises along it."""
     angle, radius = np.meshgrid(2 * np.pi * turns * np.linspace(0, 1, 41), np.linspace(0.2, 0.1, 7), indexing="ij")
-    n = np.arange(angle.size).reshape(angle.shape)
-    faces = np.stack([n[:-1, :-1], n[1:, :-1], n[1:, 1:], n[:-1, 1:]], axis=-1).reshape(-1, 4)
+    faces = quads_between(angle.shape, turned=True)
     height = rise * angle / (2 * np.pi)
     place = np.stack([radius * np.cos(angle), height, radius * np.sin(angle)], axis=-1)
     return make_surface(place.reshape(-1, 3), faces, name="arc")

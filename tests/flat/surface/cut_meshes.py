@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
+from surface_meshes import quads_between
 
 from warpflat.flat.surface.cut.cut_mesh import Cut
 from warpflat.flat.surface.half_edges import half_edges
@@ -31,7 +32,7 @@ def grid(columns: int, rows: int, *, wrap: bool = False, kinds: NDArray | None =
     index = np.arange(columns * rows).reshape(rows, columns)
     if wrap:
         index = np.column_stack([index, index[:, 0]])
-    cells = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
+    cells = quads_between(index)
     kinds = np.zeros(len(cells), dtype=int) if kinds is None else kinds
     faces = []
     for (a, b, c, d), kind in zip(cells.tolist(), kinds.tolist(), strict=True):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapely
 from numpy.typing import NDArray
-from surface_meshes import grid
+from surface_meshes import grid, quads_between
 
 from warpflat.flat.surface.injective import (
     border_edges_of,
@@ -40,8 +40,7 @@ def disk(corners: int) -> Surface:
 def ring(turns: float, steps: int) -> tuple[Surface, FloatArray]:
     """A band of radii 1 and 2 that runs around its middle, raised in space, and its layout in the plane."""
     s, r = np.meshgrid(np.linspace(0, 2 * np.pi * turns, steps + 1), [2.0, 1.5, 1.0], indexing="ij")
-    n = np.arange(s.size).reshape(s.shape)
-    faces = np.stack([n[:-1, :-1], n[1:, :-1], n[1:, 1:], n[:-1, 1:]], axis=-1).reshape(-1, 4)
+    faces = quads_between(s.shape, turned=True)
     flat = np.stack([r * np.cos(s), r * np.sin(s)], axis=-1).reshape(-1, 2)
     return make_surface(np.column_stack([flat, 0.1 * s.ravel()]), faces), flat
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from obj_files import write_obj
+from surface_meshes import quads_between
 
 import warpflat
 from warpflat.app.cli.main import main
@@ -25,8 +26,7 @@ from warpflat.garment.construction.sew_pieces import meeting_borders, unsewn_bor
 def sheet(columns: np.ndarray, rows: np.ndarray, *, name: str, triangles: bool = False) -> Surface:
     """A curved sheet over the places of its columns and rows [m]."""
     u, v = (axis.ravel() for axis in np.meshgrid(columns, rows))
-    at = np.arange(len(u)).reshape(len(rows), len(columns))
-    quads = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], -1).reshape(-1, 4)
+    quads = quads_between((len(rows), len(columns)))
     faces = np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]) if triangles else quads
     return make_surface(np.stack([u, v, 0.1 * np.sin(3 * v)], axis=-1), faces, name=name)
 

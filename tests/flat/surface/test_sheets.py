@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from obj_files import write_obj
+from surface_meshes import quads_between
 
 import warpflat
 from warpflat.app.cli.main import main
@@ -38,8 +39,7 @@ def bodice(columns: int = 21, rows: int = 26) -> tuple[np.ndarray, np.ndarray]:
     """A front that bulges, wound to the outside (+z)."""
     u, v = (axis.ravel() for axis in np.meshgrid(np.linspace(-1, 1, columns), np.linspace(0, 1, rows)))
     points = np.stack([0.2 * u, 0.5 * v, 0.12 * (1 - u**2) + 0.03 * np.sin(np.pi * v)], axis=-1)
-    at = np.arange(rows * columns).reshape(rows, columns)
-    return points, np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], -1).reshape(-1, 4)
+    return points, quads_between((rows, columns))
 
 
 def sleeve(around: int = 24, rows: int = 21) -> tuple[np.ndarray, np.ndarray]:
@@ -166,18 +166,10 @@ def test_sheets_and_a_rim_apart_with_a_pocket_and_a_coarser_inner_side(tmp_path:
     )
     pocket = (
         outer[at[6:13, 3:9].ravel()] + [0, 0, 0.001],
-        np.stack(
-            [
-                cells.ravel()
-                for cells in (lambda k: (k[:-1, :-1], k[:-1, 1:], k[1:, 1:], k[1:, :-1]))(np.arange(42).reshape(7, 6))
-            ],
-            -1,
-        ),
+        quads_between((7, 6)),
     )
     coarse = at[::5, ::2]
-    coarser = np.stack(
-        [cells.ravel() for cells in (coarse[1:, :-1], coarse[1:, 1:], coarse[:-1, 1:], coarse[:-1, :-1])], -1
-    )
+    coarser = quads_between(coarse, turned=True)
     names = ("inside", "outside", "side", "pocket")
     for below in (inner_faces, coarser):
         used, number = np.unique(below, return_inverse=True)
@@ -236,10 +228,7 @@ def test_a_pocket_comes_off_whole_and_the_front_under_it_stays(tmp_path: Path) -
     patch = at[6:13, 3:9]
     inside = patch[1:, 1:-1]  # joined to the front at the bottom and both sides, open at the top
     place = {int(v): len(points) + k for k, v in enumerate(inside.ravel())}
-    pocket = [
-        [place.get(int(v), int(v)) for v in face]
-        for face in np.stack([patch[:-1, :-1], patch[:-1, 1:], patch[1:, 1:], patch[1:, :-1]], -1).reshape(-1, 4)
-    ]
+    pocket = [[place.get(int(v), int(v)) for v in face] for face in quads_between(patch)]
     vertices = np.vstack([points, points[inside.ravel()] + [0, 0, 0.008]])
     pieces = warpflat.read_pieces(write_obj(tmp_path / "pocket.obj", (vertices, [*pocket, *quads.tolist()])), units="m")
     assert sorted(len(piece.faces) for piece in pieces) == [len(pocket), len(quads)]
@@ -311,10 +300,7 @@ def test_thick_panels_that_are_glued_rim_to_rim_are_one_sheet_each(welded: bool,
         points = np.stack(
             [np.tile(np.linspace(left, left + 0.3, 16), 21), np.repeat(np.linspace(0, 0.4, 21), 16), np.zeros(336)], -1
         )
-        at = np.arange(336).reshape(21, 16)
-        return solidified(
-            points, np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], -1).reshape(-1, 4), 0.003
-        )
+        return solidified(points, quads_between((21, 16)), 0.003)
 
     both = panel(0.0), panel(0.3)
     path = write_obj(tmp_path / "glued.obj", *both, names=("one", "other"))
@@ -335,8 +321,7 @@ def test_thick_panels_whose_outer_edges_alone_touch_are_one_sheet_each(tmp_path:
     points, _ = bodice()
     edge = points.reshape(26, 21, 3)[:, -1]
     beside = np.stack([edge + np.array([0.02 * k, 0.0, 0.0]) for k in range(16)], axis=1).reshape(-1, 3)
-    at = np.arange(26 * 16).reshape(26, 16)
-    quads = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], -1).reshape(-1, 4)
+    quads = quads_between((26, 16))
     path = write_obj(tmp_path / "rims.obj", solidified(*bodice(), 0.003), solidified(beside, quads, 0.003))
     (layer,) = read_garment(path, units="m").layers
     assert (len(layer.faces), len(border_loops(layer.faces))) == (875, 1)

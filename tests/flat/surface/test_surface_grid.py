@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from surface_meshes import quads_between
 
 from warpflat.flat.surface.cut.cut_mesh import cut_along
 from warpflat.flat.surface.grid import rows_and_columns
@@ -90,7 +91,7 @@ def corner_of_a_box() -> Surface:
     side = 4
     a, b = np.meshgrid(np.arange(side + 1.0), np.arange(side + 1.0))
     i = np.arange((side + 1) ** 2).reshape(side + 1, side + 1)
-    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    quads = quads_between(i)
     flat = [np.stack(place, axis=-1).reshape(-1, 3) for place in ((a, b, 0 * a), (0 * a, a, b), (b, 0 * a, a))]
     points, index = np.unique(np.concatenate(flat), axis=0, return_inverse=True)
     faces = np.concatenate([quads + k * i.size for k in range(3)])

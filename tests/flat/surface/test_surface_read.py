@@ -161,6 +161,7 @@ def test_chains_join_only_where_two_ends_meet():
         (SQUARE + "v 5 0 0\nv 6 0 0\nv 5 1 0\nf 1 2 3 4\nf 5 6 7\n", "2 components"),
         (SQUARE + "f 1 2 3\nf 1 4 2\nf 2 4 3\nf 3 4 1\n", "closed"),
         (SQUARE + "f 1 1 2\n", "repeated vertices"),
+        ("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "degenerate"),
     ],
 )
 def test_bad_obj_is_refused_in_one_line(tmp_path, text, words):

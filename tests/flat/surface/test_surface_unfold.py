@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from surface_meshes import quads_between
 
 from warpflat.flat.fabric.library import find_fabric
 from warpflat.flat.model.springs import springs_of
@@ -26,8 +27,7 @@ def tilted_tube(angle: float, *, skew: float = 0.0) -> tuple[FloatArray, FloatAr
     turned = flat @ np.array([[c, s], [-s, c]])
     r = 0.05
     body = np.column_stack([r * np.sin(turned[:, 0] / r), turned[:, 1], r * np.cos(turned[:, 0] / r)])
-    index = np.arange(144).reshape(12, 12)
-    faces = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
+    faces = quads_between((12, 12))
     return flat, body, faces.astype(np.int32)
 
 

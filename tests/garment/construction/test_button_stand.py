@@ -12,15 +12,15 @@ from flat_forms import flat_form, pattern_of, whole_draft
 
 from warpflat.core.errors import InputError
 from warpflat.garment.construction.button_stand import button_depths
-from warpflat.garment.construction.finishing import Finishing
+from warpflat.garment.construction.details import FinishingTable, OpeningTable
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.linings import add_interfacing
-from warpflat.garment.construction.openings import Buttons, Opening, OpeningPart, place_opening
+from warpflat.garment.construction.openings import OpeningPart, place_opening
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.pieces import Pattern
 
-BUTTONED = Opening(kind="buttons", line="centre front", length=np.inf, width=0.02, buttons=Buttons())
-FACING = Finishing(kind="facing", edge="neck", width=0.055)
+BUTTONED = OpeningTable(kind="buttons", seam="centre front", width_mm=20)
+FACING = FinishingTable(kind="facing", edge="neck", width_mm=55)
 
 
 @pytest.fixture(scope="module")
@@ -35,12 +35,12 @@ def whole() -> Garment:
     return flat_form("bodice")
 
 
-def opened(garment: Garment, *openings: Opening, finishing: tuple[Finishing, ...] = ()) -> Pattern:
+def opened(garment: Garment, *openings: OpeningTable, finishing: tuple[FinishingTable, ...] = ()) -> Pattern:
     return pattern_of(garment, *finishing, openings=openings)
 
 
 def test_stand_lies_upon_the_other_half_where_it_is_buttoned(bodice: Garment):
-    separate = replace(BUTTONED, buttons=replace(BUTTONED.buttons, facing="separate"))
+    separate = BUTTONED.model_copy(update={"facing": "separate"})
     before, after = opened(bodice).piece("front_left", ""), opened(bodice, separate).piece("front_left", "")
     line = after.internal_lines["centre front"]
     along = (line[1] - line[0]) / np.linalg.norm(line[1] - line[0])
@@ -72,7 +72,7 @@ def test_buttons_lie_on_the_centre_and_one_on_the_bust(bodice: Garment):
 
 @pytest.mark.parametrize("facing", ["grown-on", "separate"])
 def test_facing_of_neck_and_stand_is_joined_at_the_shoulders(bodice: Garment, facing: str):
-    opening = replace(BUTTONED, buttons=replace(BUTTONED.buttons, facing=facing))
+    opening = BUTTONED.model_copy(update={"facing": facing})
     pattern = opened(bodice, opening, finishing=(FACING,))
     names = [piece.name for piece in pattern.pieces[""]]
     assert ("front_left_neck_facing" in names) == (facing == "separate")
@@ -94,7 +94,7 @@ def test_facing_of_neck_and_stand_is_joined_at_the_shoulders(bodice: Garment, fa
 def test_interfacing_of_a_grown_on_facing_is_as_large_as_that(bodice: Garment):
     pattern = add_interfacing(opened(bodice, BUTTONED, finishing=(FACING,)), "fleece")
     front, own = pattern.piece("front_left", ""), pattern.piece("front_left_facing_interfacing", "")
-    separate = replace(BUTTONED, buttons=replace(BUTTONED.buttons, facing="separate"))
+    separate = BUTTONED.model_copy(update={"facing": "separate"})
     facing = opened(bodice, separate, finishing=(FACING,)).piece("front_left_neck_facing", "")
     assert shapely.Polygon(own.outline).area == pytest.approx(shapely.Polygon(facing.outline).area, rel=1e-6)
     assert shapely.Polygon(front.outline).buffer(1e-6).contains(shapely.Polygon(own.outline))
@@ -110,7 +110,7 @@ def test_ring_open_from_edge_to_edge_passes(bodice: Garment):
 
 
 def test_stand_of_a_part_of_the_seam_leaves_the_rest_sewn(bodice: Garment):
-    pattern = opened(bodice, replace(BUTTONED, length=0.2))
+    pattern = opened(bodice, BUTTONED.model_copy(update={"length_mm": 200}))
     front = pattern.piece("front_left", "")
     assert "centre front" in {seam.name for seam in pattern.seams}
     full = opened(bodice).piece("front_left", "").edge("centre front").length
@@ -129,21 +129,21 @@ def test_a_stand_all_along_an_edge_ends_with_it(bodice: Garment, monkeypatch: py
 
 
 def test_buttons_keep_to_the_count_of_another_size():
-    depths = button_depths(Buttons(spacing=0.09), 0.5, 0.2)
-    assert len(button_depths(Buttons(spacing=0.09), 0.55, 0.22, len(depths))) == len(depths)
-    assert len(button_depths(Buttons(count=7), 0.5, None)) == 7
+    depths = button_depths(BUTTONED.model_copy(update={"spacing_mm": 90}), 0.5, 0.2)
+    assert len(button_depths(BUTTONED.model_copy(update={"spacing_mm": 90}), 0.55, 0.22, len(depths))) == len(depths)
+    assert len(button_depths(BUTTONED.model_copy(update={"count": 7}), 0.5, None)) == 7
     with pytest.raises(InputError, match="no room for buttons"):
-        button_depths(Buttons(), 0.03, None)
+        button_depths(BUTTONED, 0.03, None)
 
 
 def test_curved_edge_has_no_stand(whole: Garment):
-    side = Opening(kind="buttons", line="side left", length=np.inf, width=0.02, buttons=Buttons())
+    side = OpeningTable(kind="buttons", seam="side left", width_mm=20)
     with pytest.raises(InputError, match=r"strays .* mm from straight and cannot have a button stand"):
         opened(whole, side)
 
 
 def test_keyhole_is_drawn_on_its_piece_and_on_its_facing(whole: Garment):
-    hole = Opening(kind="keyhole", line="centre back", length=0.12, width=0.012)
+    hole = OpeningTable(kind="keyhole", seam="centre back", length_mm=120, width_mm=12)
     plain, pattern = opened(whole, finishing=(FACING,)), opened(whole, hole, finishing=(FACING,))
     assert [piece.name for piece in pattern.pieces[""]] == [piece.name for piece in plain.pieces[""]]
     for name in ("back", "back_neck_facing"):

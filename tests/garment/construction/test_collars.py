@@ -11,19 +11,17 @@ from flat_forms import flat_form, pattern_of, whole_draft
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length
-from warpflat.garment.construction.collars import Collar
-from warpflat.garment.construction.finishing import Finishing
+from warpflat.garment.construction.details import FinishingTable, OpeningTable
 from warpflat.garment.construction.free_edges import free_chain, joined_line
 from warpflat.garment.construction.garment import Garment
-from warpflat.garment.construction.openings import Buttons, Opening
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.fitting import drawn_length
 from warpflat.pattern.drafting.piece_parts import Edge
 from warpflat.pattern.drafting.pieces import Pattern
 from warpflat.pattern.drafting.sewing_order import sewing_steps
 
-BUTTONS = Opening(kind="buttons", line="centre front", length=np.inf, width=0.02, buttons=Buttons())
-ZIP = Opening(kind="zip", line="centre back", length=0.3)
+BUTTONS = OpeningTable(kind="buttons", seam="centre front", width_mm=20)
+ZIP = OpeningTable(kind="zip", seam="centre back", length_mm=300)
 
 
 def drawn(edge: Edge) -> float:
@@ -46,9 +44,8 @@ def buttoned() -> Garment:
     return flat_form("bodice", BUTTONS)
 
 
-def with_neck(garment: Garment, kind: str = "collar", **collar: object) -> Pattern:
-    wish = Finishing(kind=kind, edge="neck", width=0.03, collar=Collar(**{"style": "", "width": 0.03, **collar}))  # type: ignore[arg-type]
-    return pattern_of(garment, wish)
+def with_neck(garment: Garment, kind: str = "collar", **given: object) -> Pattern:
+    return pattern_of(garment, FinishingTable(kind=kind, edge="neck", **given))  # type: ignore[arg-type]
 
 
 def check_seams(pattern: Pattern) -> None:
@@ -58,7 +55,7 @@ def check_seams(pattern: Pattern) -> None:
 
 
 def test_stand_goes_to_the_edges_of_the_button_stand_and_leans_to_the_neck(buttoned: Garment):
-    pattern = with_neck(buttoned, style="stand", width=0.035)
+    pattern = with_neck(buttoned, style="stand", width_mm=35)
     check_seams(pattern)
     stand, front, back = (pattern.piece(name, "") for name in ("collar_stand", "front_left", "back"))
     assert stand.quantity == 2
@@ -76,7 +73,7 @@ def test_stand_goes_to_the_edges_of_the_button_stand_and_leans_to_the_neck(butto
 def test_outer_edge_of_a_shirt_collar_reaches_around_the_line_below_the_seam_of_its_stand(
     buttoned: Garment, fall: float
 ):
-    pattern = with_neck(buttoned, style="shirt", width=0.03, fall=fall, point=0.07)
+    pattern = with_neck(buttoned, style="shirt", width_mm=30, fall_mm=1e3 * fall, point_mm=70)
     check_seams(pattern)
     collar, stand = pattern.piece("collar", ""), pattern.piece("collar_stand", "")
     assert drawn(collar.edge("lower")) == pytest.approx(drawn(stand.edge("upper")), abs=2e-5)
@@ -100,18 +97,18 @@ def test_outer_edge_of_a_shirt_collar_reaches_around_the_line_below_the_seam_of_
 
 def test_fall_that_does_not_hide_its_stand_is_refused(buttoned: Garment):
     with pytest.raises(InputError, match="fall_mm = 30 must be at least 4 more than width_mm = 30"):
-        with_neck(buttoned, style="shirt", width=0.03, fall=0.03)
+        with_neck(buttoned, style="shirt", width_mm=30, fall_mm=30)
 
 
 def test_convertible_collar_ends_at_the_centre_front(buttoned: Garment):
-    pattern = with_neck(buttoned, style="convertible", width=0.075)
+    pattern = with_neck(buttoned, style="convertible", width_mm=75)
     check_seams(pattern)
     neck = with_neck(buttoned, style="stand").piece("collar_stand", "").edge("lower").length
     assert neck - pattern.piece("collar", "").edge("lower").length == pytest.approx(2.0 * BUTTONS.width, rel=0.1)
 
 
 def test_flat_collar_repeats_the_neckline_and_meets_in_front(plain: Garment):
-    pattern = with_neck(plain, style="flat", width=0.06)
+    pattern = with_neck(plain, style="flat", width_mm=60)
     check_seams(pattern)
     collar = pattern.piece("collar", "")
     whole = sum(
@@ -130,7 +127,7 @@ def test_flat_collar_repeats_the_neckline_and_meets_in_front(plain: Garment):
 
 
 def test_flat_collar_with_a_zip_behind_has_two_halves(zipped: Garment):
-    pattern = with_neck(zipped, style="flat", width=0.06)
+    pattern = with_neck(zipped, style="flat", width_mm=60)
     check_seams(pattern)
     assert pattern.piece("collar", "").quantity == 4
     with pytest.raises(InputError, match="opens in front"):
@@ -144,7 +141,7 @@ def test_collar_needs_an_opening(plain: Garment):
 
 @pytest.mark.parametrize("strip", [0.0, 0.1])
 def test_hood_goes_around_the_neck_and_over_the_head(plain: Garment, strip: float):
-    pattern = with_neck(plain, kind="hood", strip=strip)
+    pattern = with_neck(plain, kind="hood", strip_mm=1e3 * strip)
     check_seams(pattern)
     hood = pattern.piece("hood", "")
     whole = sum(
@@ -170,9 +167,7 @@ def test_hood_needs_a_neckline_that_is_whole_behind(zipped: Garment):
 
 
 def test_placket_opens_the_neck_in_front_and_its_strips_fill_a_box(plain: Garment):
-    wish = Finishing(
-        kind="collar", edge="neck", width=0.07, placket=0.14, collar=Collar(style="convertible", width=0.07)
-    )
+    wish = FinishingTable(kind="collar", edge="neck", width_mm=70, placket_mm=140, style="convertible")
     garment = replace(plain, finishing=(wish,))
     pattern = pattern_of(garment)
     check_seams(pattern)
@@ -192,4 +187,4 @@ def test_placket_opens_the_neck_in_front_and_its_strips_fill_a_box(plain: Garmen
     rings = {ring.name: ring for ring in garment.rings}
     assert rings["neck"].opened == pytest.approx(0.28)
     with pytest.raises(InputError, match="does not lie within 'front'"):
-        pattern_of(plain, replace(wish, placket=0.9))
+        pattern_of(plain, wish.model_copy(update={"placket_mm": 900}))

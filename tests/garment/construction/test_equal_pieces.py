@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from polygons import polygon
 from pypdf import PdfReader
 
 import warpflat
@@ -89,8 +90,7 @@ def test_pieces_that_are_mirror_images_are_cut_turned_over() -> None:
     def lopsided(number: int, side: float) -> Piece:
         points = np.array([[0.0, 0.0], [0.2, 0.05], [0.15, 0.3], [0.0, 0.25]]) * [side, 1.0]
         ring = points if side > 0 else points[::-1]
-        edges = [Edge(name=f"e{k}", points=np.array([ring[k], ring[(k + 1) % 4]])) for k in range(4)]
-        return Piece(name=f"piece_{number}", edges=edges, grain=np.array([[0.05, 0.05], [0.05, 0.2]]) * [side, 1.0])
+        return polygon(f"piece_{number}", ring, grain=np.array([[0.05, 0.05], [0.05, 0.2]]) * [side, 1.0])
 
     pieces = [lopsided(0, 1.0), lopsided(1, -1.0)]
     image = next(edge.name for edge in pieces[1].edges if edge.points.max() < 1e-9 or np.ptp(edge.points[:, 0]) < 1e-9)

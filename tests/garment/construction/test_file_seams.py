@@ -13,6 +13,7 @@ import pytest
 import trimesh
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from surface_meshes import quads_between
 
 import warpflat
 from warpflat.app.cli.main import main
@@ -229,9 +230,8 @@ def test_a_run_along_islands_sews_them_again(tmp_path: Path) -> None:
 
 
 def test_a_half_that_lies_mirrored_on_the_other_is_an_island_of_its_own(tmp_path: Path) -> None:
-    grid = np.arange(35).reshape(5, 7)
     x, y = np.meshgrid(np.linspace(-0.3, 0.3, 7), np.linspace(0.0, 0.4, 5))
-    quads = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
+    quads = quads_between((5, 7))
     x, y = x.ravel(), y.ravel()
     back = np.stack([x, y, 0.1 * x * x], axis=1), quads
     path = obj_files.write_obj(tmp_path / "back.obj", back, texture=[np.stack([abs(x), y], axis=1)], digits="g")
@@ -268,9 +268,8 @@ def test_slits_in_line_are_one_seam(tmp_path: Path, gap: int, seams: int) -> Non
 
 
 def test_crumbs_of_a_texture_are_joined_to_their_neighbour(tmp_path: Path) -> None:
-    grid = np.arange(41 * 41).reshape(41, 41)
     x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(0, 0.4, 41), np.linspace(0, 0.4, 41)))
-    quads = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
+    quads = quads_between((41, 41))
     rows = [f"v {a:g} {b:g} 0\nvt {a:g} {b:g}" for a, b in zip(x, y, strict=True)]
     rows += [f"vt {2 + a:g} {b:g}" for a, b in zip(x, y, strict=True)]
     for number, quad in enumerate(quads.tolist()):

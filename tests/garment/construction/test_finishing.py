@@ -10,16 +10,15 @@ import pytest
 from flat_forms import flat_form, pattern_of, whole_draft
 
 from warpflat.core.errors import InputError
-from warpflat.garment.construction.finishing import Finishing
+from warpflat.garment.construction.details import FinishingTable, OpeningTable
 from warpflat.garment.construction.garment import Garment
-from warpflat.garment.construction.openings import Opening
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.fitting import drawn_length
 from warpflat.pattern.drafting.pieces import Pattern
 from warpflat.pattern.drafting.sewing_order import notions, sewing_steps
 
-ZIP = Opening(kind="zip", line="centre back", length=0.4)
-FACING = Finishing(kind="facing", edge="neck", width=0.055)
+ZIP = OpeningTable(kind="zip", seam="centre back", length_mm=400)
+FACING = FinishingTable(kind="facing", edge="neck", width_mm=55)
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +58,7 @@ def test_facings_repeat_the_neck_and_are_joined_at_the_shoulders(parted: Garment
 
 def test_band_of_a_closed_neck_is_a_ring(half: Garment):
     share = 0.87
-    pattern = pattern_of(half, Finishing(kind="band", edge="neck", width=0.02, share=share))
+    pattern = pattern_of(half, FinishingTable(kind="band", edge="neck", width_mm=20, share=share))
     whole = 2 * edge_length(pattern, [("front", "neck"), ("back", "neck")])
     band = pattern.piece("neck_band", "")
     assert band.quantity == 1
@@ -71,8 +70,8 @@ def test_band_of_a_closed_neck_is_a_ring(half: Garment):
 
 
 def test_zip_at_one_side_of_a_half_opens_its_ring_once(half: Garment):
-    shoulder = Opening(kind="zip", line="shoulder left", length=0.1)
-    pattern = pattern_of(replace(half, openings=(shoulder,)), Finishing(kind="band", edge="neck", width=0.02))
+    shoulder = OpeningTable(kind="zip", seam="shoulder left", length_mm=100)
+    pattern = pattern_of(replace(half, openings=(shoulder,)), FinishingTable(kind="band", edge="neck", width_mm=20))
     seams = {seam.name: seam for seam in pattern.seams}
     # All around, and not sewn to a ring.
     assert len(seams["neck band"].sides[1]) == 4
@@ -80,8 +79,8 @@ def test_zip_at_one_side_of_a_half_opens_its_ring_once(half: Garment):
 
 
 def test_waistband_ends_at_the_zip(parted: Garment):
-    opened = replace(parted, openings=(replace(ZIP, length=0.1),))
-    pattern = pattern_of(opened, Finishing(kind="waistband", edge="neck", width=0.03, overlap=0.025))
+    opened = replace(parted, openings=(ZIP.model_copy(update={"length_mm": 100}),))
+    pattern = pattern_of(opened, FinishingTable(kind="waistband", edge="neck", width_mm=30, overlap_mm=25))
     band = pattern.piece("waistband", "")
     sides = next(seam for seam in pattern.seams if seam.name == "waistband").sides[1]
     # From one side of the centre back around to the other.
@@ -99,7 +98,7 @@ def test_waistband_ends_at_the_zip(parted: Garment):
 
 
 def test_armholes_get_a_binding_each(parted: Garment):
-    pattern = pattern_of(parted, Finishing(kind="binding", edge="armhole", width=0.035))
+    pattern = pattern_of(parted, FinishingTable(kind="binding", edge="armhole", width_mm=35))
     binding = pattern.piece("armhole_binding", "")
     assert binding.quantity == 2
     assert binding.edge("lower").length == pytest.approx(
@@ -113,6 +112,6 @@ def test_armholes_get_a_binding_each(parted: Garment):
 
 def test_edge_that_is_not_free_is_named(parted: Garment):
     with pytest.raises(InputError, match=r"finishing\[0\]: no free edge 'shoulder'"):
-        pattern_of(parted, replace(FACING, edge="shoulder"))
+        pattern_of(parted, FACING.model_copy(update={"edge": "shoulder"}))
     with pytest.raises(InputError, match="shorter than the facing is wide"):
-        pattern_of(parted, replace(FACING, width=0.25))
+        pattern_of(parted, FACING.model_copy(update={"width_mm": 250}))

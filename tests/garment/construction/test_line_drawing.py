@@ -8,21 +8,20 @@ import numpy as np
 import pytest
 from flat_forms import flat_form
 
-from warpflat.garment.construction.finishing import Finishing
+from warpflat.garment.construction.details import FinishingTable, OpeningTable
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.line_drawing import describe_worn
-from warpflat.garment.construction.openings import Buttons, Opening
 from warpflat.pattern.drafting.piece_parts import Edge
 from warpflat.pattern.drafting.pieces import Piece
 
 
-def skirt(opening: Opening, *, half: bool) -> Garment:
+def skirt(opening: OpeningTable, *, half: bool) -> Garment:
     garment = flat_form("skirt", opening, half=half)
-    return replace(garment, finishing=(Finishing(kind="waistband", edge="waist", width=0.03),))
+    return replace(garment, finishing=(FinishingTable(kind="waistband", edge="waist", width_mm=30),))
 
 
 def test_waistband_lies_above_the_waist_and_a_zip_in_the_side_is_seen_on_that_side():
-    garment = skirt(Opening(kind="zip", line="side left", length=0.2), half=True)
+    garment = skirt(OpeningTable(kind="zip", seam="side left", length_mm=200), half=True)
     views = describe_worn({"": garment}, "").views
     for name, sign in (("front", 1.0), ("back", -1.0)):
         # What of the band is on the far side lies behind all pieces.
@@ -40,7 +39,7 @@ def test_waistband_lies_above_the_waist_and_a_zip_in_the_side_is_seen_on_that_si
 
 
 def test_every_button_is_drawn_in_front():
-    opening = Opening(kind="buttons", line="centre front", length=0.4, buttons=Buttons(count=5))
+    opening = OpeningTable(kind="buttons", seam="centre front", length_mm=400, count=5)
     views = describe_worn({"": skirt(opening, half=False)}, "").views
     (buttons,) = [piece for piece in views["front"] if not piece.outlines]
     heights = [float(circle[:, 1].mean()) for circle in buttons.lines]
@@ -51,7 +50,9 @@ def test_every_button_is_drawn_in_front():
 
 
 def test_a_zip_at_the_centre_back_is_not_seen_from_the_front():
-    views = describe_worn({"": skirt(Opening(kind="zip", line="centre back", length=0.2), half=False)}, "").views
+    views = describe_worn(
+        {"": skirt(OpeningTable(kind="zip", seam="centre back", length_mm=200), half=False)}, ""
+    ).views
     drawn = {name: [piece for piece in row if not piece.outlines] for name, row in views.items()}
     assert drawn["front"] == []
     (zipped,) = drawn["back"]
@@ -61,13 +62,13 @@ def test_a_zip_at_the_centre_back_is_not_seen_from_the_front():
 @pytest.mark.parametrize(
     ("wish", "wider", "lines"),
     [
-        (Finishing(kind="ruffle", edge="knee", width=0.2, share=3.0, pleat=0.05), 0.015, 11),
-        (Finishing(kind="ruffle", edge="knee", width=0.1, share=1.8), 0.04, 17),
-        (Finishing(kind="flounce", edge="knee", width=0.2, turns=1.0), 0.14, 7),
+        (FinishingTable(kind="ruffle", edge="knee", width_mm=200, share=3.0, pleat_mm=50), 0.015, 11),
+        (FinishingTable(kind="ruffle", edge="knee", width_mm=100, share=1.8), 0.04, 17),
+        (FinishingTable(kind="flounce", edge="knee", width_mm=200, turns=1.0), 0.14, 7),
     ],
 )
-def test_ruffle_hangs_below_its_edge_with_its_folds(wish: Finishing, wider: float, lines: int):
-    garment = skirt(Opening(kind="zip", line="side left", length=0.2), half=True)
+def test_ruffle_hangs_below_its_edge_with_its_folds(wish: FinishingTable, wider: float, lines: int):
+    garment = skirt(OpeningTable(kind="zip", seam="side left", length_mm=200), half=True)
     plain, drawn = (describe_worn({"": replace(garment, finishing=row)}, "").views for row in ((), (wish,)))
     for name in ("front", "back"):
         before, after = (
@@ -82,7 +83,7 @@ def test_ruffle_hangs_below_its_edge_with_its_folds(wish: Finishing, wider: floa
 
 
 def test_right_half_of_a_wrap_covers_the_left_one():
-    garment = skirt(Opening(kind="wrap", line="centre front", length=np.inf, width=0.12), half=False)
+    garment = skirt(OpeningTable(kind="wrap", seam="centre front", width_mm=120), half=False)
     views = describe_worn({"": garment}, "").views
     shell = [piece for piece in views["front"] if piece.outlines][1:-1]
     # To the viewer's right of the centre by its width; nothing of the centre line is seen on it.
@@ -94,7 +95,7 @@ def test_right_half_of_a_wrap_covers_the_left_one():
 
 
 def test_patches_are_drawn_on_their_side_of_the_body():
-    garment = skirt(Opening(kind="zip", line="side left", length=0.2), half=False)
+    garment = skirt(OpeningTable(kind="zip", seam="side left", length_mm=200), half=False)
     sides = {
         "pocket": [[0.05, 0.4], [0.05, 0.3]], "pocket 2": [[0.05, 0.3], [0.15, 0.3]],
         "pocket 3": [[0.15, 0.3], [0.15, 0.4]],

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from obj_files import write_obj
+from surface_meshes import quads_between
 
 from warpflat.flat.surface.io.read import read_surface
 from warpflat.flat.surface.io.read_pieces import read_pieces
@@ -19,8 +20,7 @@ from warpflat.garment.construction.sew_pieces import meeting_borders, unsewn_bor
 def _sheet(columns: int = 9, rows: int = 11) -> tuple[Any, Any]:
     """A sheet of 30 x 40 cm that bulges by 4 cm along its length."""
     u, v = (a.ravel() for a in np.meshgrid(np.linspace(0, 0.3, columns), np.linspace(0, 0.4, rows)))
-    at = np.arange(rows * columns).reshape(rows, columns)
-    quads = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 4)
+    quads = quads_between((rows, columns))
     return np.stack([u, v, 0.04 * np.sin(np.pi * u / 0.3) * np.sin(np.pi * v / 0.4)], axis=-1), quads
 
 

@@ -11,16 +11,17 @@ from flat_forms import pattern_of, whole_draft
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
+from warpflat.garment.construction.details import OpeningTable
 from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.garment import Garment
-from warpflat.garment.construction.openings import Opening, one_sided, part_at_centres
+from warpflat.garment.construction.openings import one_sided, part_at_centres
 from warpflat.garment.mannequin.forms import shipped_form
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.pieces import Pattern, Piece
 from warpflat.pattern.drafting.sewing_order import sewn_seams
 
-ZIP = Opening(kind="zip", line="centre back", length=0.20)
+ZIP = OpeningTable(kind="zip", seam="centre back", length_mm=200)
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +36,7 @@ def skirt(mannequin: Mannequin) -> Garment:
     return flatten_form(mannequin, mannequin.form(form), fabric="denim", curves_mm=0.0)
 
 
-def opened(skirt: Garment, *openings: Opening) -> Pattern:
+def opened(skirt: Garment, *openings: OpeningTable) -> Pattern:
     return pattern_of(skirt, openings=openings)
 
 
@@ -63,9 +64,11 @@ def test_zip_at_centre_back_parts_the_back_and_lets_the_waist_pass(skirt: Garmen
 
 
 def test_a_zip_in_one_side_leaves_left_and_right_one_pattern(mannequin: Mannequin):
-    form = part_at_centres(mannequin.layout, shipped_form("a_line_skirt"), [ZIP, replace(ZIP, line="centre front")])
+    form = part_at_centres(
+        mannequin.layout, shipped_form("a_line_skirt"), [ZIP, ZIP.model_copy(update={"seam": "centre front"})]
+    )
     skirt = flatten_form(mannequin, mannequin.form(form), fabric="denim", curves_mm=0.0)
-    pattern = opened(skirt, replace(ZIP, line="side left"))
+    pattern = opened(skirt, ZIP.model_copy(update={"seam": "side left"}))
     assert {p.name: p.quantity for p in pattern.pieces[""]} == {"front_left": 2, "back_left": 2}
     drafted = draft_garment(pattern)
     sides = {seam.name: seam for seam in sewn_seams(drafted, "") if seam.name.startswith("side")}
@@ -74,9 +77,13 @@ def test_a_zip_in_one_side_leaves_left_and_right_one_pattern(mannequin: Mannequi
     assert len({seam.letter for seam in sides.values()}) == 1
     assert max(seam.notches_mm or 0.0 for seam in drafted.seams) < 0.2
     # A slit is cut: what has it is drawn for its own side, and nothing else is.
-    slit = opened(skirt, Opening(kind="slit", line="centre back", length=0.1), replace(ZIP, line="side left"))
+    slit = opened(
+        skirt,
+        OpeningTable(kind="slit", seam="centre back", length_mm=100),
+        ZIP.model_copy(update={"seam": "side left"}),
+    )
     assert {p.name: p.quantity for p in slit.pieces[""]} == {"front_left": 2, "back_left": 2}
-    slit = opened(skirt, Opening(kind="slit", line="side left", length=0.1))
+    slit = opened(skirt, OpeningTable(kind="slit", seam="side left", length_mm=100))
     assert {p.quantity for p in slit.pieces[""]} == {1}
 
 
@@ -91,7 +98,7 @@ def test_halves_that_rest_a_little_apart_are_drawn_once(skirt: Garment):
 
 
 def test_zip_that_ends_too_early_lets_nothing_pass(skirt: Garment):
-    assert not passes(replace(skirt, openings=(replace(ZIP, length=0.05),)))["waist"]
+    assert not passes(replace(skirt, openings=(ZIP.model_copy(update={"length_mm": 50}),)))["waist"]
 
 
 def test_zip_has_a_notch_at_its_end_and_a_line(skirt: Garment):
@@ -110,8 +117,8 @@ def free_edge(piece: Piece, name: str) -> float:
 
 
 def test_slit_and_vent_are_edges_of_their_own(skirt: Garment):
-    vent = Opening(kind="vent", line="centre back", length=0.15, width=0.04)
-    slits = [Opening(kind="slit", line=f"side {side}", length=0.1, width=0.015) for side in ("left", "right")]
+    vent = OpeningTable(kind="vent", seam="centre back", length_mm=150, width_mm=40)
+    slits = [OpeningTable(kind="slit", seam=f"side {side}", length_mm=100, width_mm=15) for side in ("left", "right")]
     before, after = opened(skirt), opened(skirt, ZIP, vent, *slits)
     back, plain = after.piece("back_left", ""), before.piece("back_left", "")
     assert free_edge(back, "centre back vent") == pytest.approx(0.15, abs=1e-9)
@@ -126,11 +133,11 @@ def test_slit_and_vent_are_edges_of_their_own(skirt: Garment):
 
 
 def test_opening_on_one_side_alone_keeps_both_patterns(skirt: Garment):
-    one = Opening(kind="slit", line="side left", length=0.1)
+    one = OpeningTable(kind="slit", seam="side left", length_mm=100)
     assert one_sided([one]) == [one]
-    assert not one_sided([one, replace(one, line="side right")])
+    assert not one_sided([one, one.model_copy(update={"seam": "side right"})])
     assert not one_sided([ZIP])
-    assert one_sided([one, replace(one, line="side right", length=0.2)])
+    assert one_sided([one, one.model_copy(update={"seam": "side right", "length_mm": 200})])
     pattern = opened(skirt, one)
     assert {p.name for p in pattern.pieces[""]} == {"front", "back_left", "back_right"}
     whole_draft(pattern)
@@ -138,11 +145,11 @@ def test_opening_on_one_side_alone_keeps_both_patterns(skirt: Garment):
 
 def test_opening_that_cannot_be_is_named(skirt: Garment):
     with pytest.raises(InputError, match="no seam 'side'"):
-        opened(skirt, Opening(kind="zip", line="side", length=0.2))
+        opened(skirt, OpeningTable(kind="zip", seam="side", length_mm=200))
     with pytest.raises(InputError, match=r"ends 900 mm along 'centre back', which is \d+ mm long"):
-        opened(skirt, replace(ZIP, length=0.9))
+        opened(skirt, ZIP.model_copy(update={"length_mm": 900}))
     whole = float(
         polyline_length(skirt.pieces["back_left"].positions[skirt.form.pieces["back_left"].edges["centre back"]])
     )
     with pytest.raises(InputError, match="leaves nothing of the seam"):
-        opened(skirt, Opening(kind="vent", line="centre back", length=whole - 0.01))
+        opened(skirt, OpeningTable(kind="vent", seam="centre back", length_mm=1e3 * whole - 10))

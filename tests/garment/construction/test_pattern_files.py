@@ -15,8 +15,11 @@ import numpy as np
 import pytest
 import shapely
 from obj_files import write_obj
+from polygons import corners_of, polygon, sides
+from polygons import drafted as drafted_alone
 from printed import faults
 from sample_dress import sample_dress
+from surface_meshes import quads_between
 
 from warpflat.app.cli.main import main
 from warpflat.app.scene.load import load_scene
@@ -37,7 +40,7 @@ from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.edge_rules import EdgeRules
 from warpflat.pattern.drafting.half_pieces import halved
 from warpflat.pattern.drafting.piece_parts import Dart, Edge, Hole
-from warpflat.pattern.drafting.pieces import Pattern, Piece
+from warpflat.pattern.drafting.pieces import Piece
 from warpflat.pattern.drafting.tile_nesting import orders
 from warpflat.pattern.export.dxf import write_dxf
 from warpflat.pattern.export.pattern_files import PatternOptions, export_patterns
@@ -307,8 +310,7 @@ def test_what_lies_over_itself_in_the_plane_is_said_in_the_metrics_and_by_the_ex
     # A spiral ramp: developed, it goes round by more than a full turn.
     turn, out = np.meshgrid(np.linspace(0, 2.6 * np.pi, 41), np.linspace(0.1, 0.2, 5))
     ramp = np.stack([out * np.cos(turn), out * np.sin(turn), 0.03 * turn], axis=-1).reshape(-1, 3)
-    i = np.arange(len(ramp)).reshape(turn.shape)
-    quads = np.stack([i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]], axis=-1).reshape(-1, 4)
+    quads = quads_between(turn.shape, turned=True)
     path = write_obj(tmp_path / "ramp.obj", (ramp, quads), digits="")
     parted = ["flatten", str(path), "--units", "m", "--out", str(tmp_path / "out"), "--no-picture"]
     parted += ["--frames", "0"]
@@ -357,7 +359,7 @@ def test_two_ragged_sides_of_a_dart_are_smoothed_alike_and_stay_equally_long():
         leg[1:-1] += random.normal(0, 1e-3, (39, 2))
     corners = np.array([right[0], (0.4, 0.0), (0.4, 0.5), (0.0, 0.5), (0.0, 0.0), left[0]])
     edges = [Edge(name="l", points=left, kind="dart"), Edge(name="r", points=right[::-1], kind="dart")]
-    edges += [Edge(name=f"e{i}", points=corners[i : i + 2]) for i in range(5)]
+    edges += sides(corners, closed=False)
     piece = draft_piece(Piece(name="p", edges=edges, darts=[Dart(name="d", left="l", right="r", cut=True)]))
     first, second = piece.edge("l"), piece.edge("r")
     assert first.tolerance == second.tolerance > 1e-4
@@ -367,12 +369,14 @@ def test_two_ragged_sides_of_a_dart_are_smoothed_alike_and_stay_equally_long():
     assert [note for note in piece.notes if "legs differ" in note] == []
 
 
+def with_vent() -> Piece:
+    """A square of 300 mm with a square hole of 50 mm."""
+    vent = Hole(name="vent", points=np.array(corners_of(0.05, 0.05, 0.1, 0.1)))
+    return polygon("p", corners_of(0.3, 0.3), holes=[vent])
+
+
 def test_holes_have_both_lines_in_every_file(tmp_path: Path):
-    corners = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)])
-    border = [Edge(name=f"e{i}", points=0.3 * corners[i : i + 2]) for i in range(4)]
-    vent = Hole(name="vent", points=0.1 + 0.05 * corners[:4])
-    garment = Pattern(name="p", pieces={"": [Piece(name="p", edges=border, holes=[vent])]})
-    drafted = draft_garment(garment)
+    drafted = drafted_alone(with_vent())
     read = pattern_from_json(json.loads(json.dumps(pattern_json(drafted))))
     assert pattern_json(read) == pattern_json(drafted)
     for pattern in (drafted, read):
@@ -391,10 +395,7 @@ def test_holes_have_both_lines_in_every_file(tmp_path: Path):
 
 
 def test_files_from_before_holes_had_allowances_are_read(tmp_path: Path):
-    corners = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)])
-    border = [Edge(name=f"e{i}", points=0.3 * corners[i : i + 2]) for i in range(4)]
-    vent = Hole(name="vent", points=0.1 + 0.05 * corners[:4])
-    data = json.loads(json.dumps(pattern_json(as_garment(Piece(name="p", edges=border, holes=[vent])))))
+    data = json.loads(json.dumps(pattern_json(drafted_alone(with_vent()))))
     piece = data["sizes"][""]["p"]
     del piece["cutout_sew_lines"], piece["cutout_allowances"], piece["label"]["angle"], piece["label"]["leader"]
     (read,) = pattern_from_json(data).pieces[""]
@@ -407,10 +408,8 @@ def test_files_from_before_holes_had_allowances_are_read(tmp_path: Path):
 
 
 def test_a_label_beside_its_piece_is_in_every_file(tmp_path: Path):
-    corners = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)])
-    border = [Edge(name=f"e{i}", points=0.2 * corners[i : i + 2]) for i in range(4)]
-    opening = Hole(name="opening", points=0.004 + 0.192 * corners[:4])
-    drafted = as_garment(Piece(name="rim", edges=border, holes=[opening]))
+    opening = Hole(name="opening", points=np.array(corners_of(0.192, 0.192, 0.004, 0.004)))
+    drafted = drafted_alone(polygon("rim", corners_of(0.2, 0.2), holes=[opening]))
     read = pattern_from_json(json.loads(json.dumps(pattern_json(drafted))))
     assert pattern_json(read) == pattern_json(drafted)
     write_svg(read, tmp_path / "p.svg")
@@ -421,10 +420,6 @@ def test_a_label_beside_its_piece_is_in_every_file(tmp_path: Path):
     tiling = write_pdf(read, tmp_path / "p.pdf")
     columns = {column for _, column in tiling.tiles}
     assert columns == {0, 1}, "the label is printed too"
-
-
-def as_garment(piece: Piece) -> DraftedGarment:
-    return draft_garment(Pattern(name="p", pieces={"": [piece]}))
 
 
 def test_rules_name_holes():
@@ -538,9 +533,7 @@ def test_a_broken_file_is_one_line(text: str, said: str, tmp_path: Path):
 
 
 def test_a_size_of_a_pattern_without_sizes_is_told(tmp_path: Path):
-    corners = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)])
-    border = [Edge(name=f"e{i}", points=0.3 * corners[i : i + 2]) for i in range(4)]
-    drafted = as_garment(Piece(name="plain", edges=border))
+    drafted = drafted_alone(polygon("plain", corners_of(0.3, 0.3)))
     (tmp_path / "pattern.json").write_text(json.dumps(pattern_json(drafted)))
     for kind in ("dxf", "svg", "pdf"):
         with pytest.raises(InputError, match="garment 'p' has no sizes: it is not graded"):

@@ -10,14 +10,17 @@ import shapely
 from flat_forms import whole_draft
 
 from warpflat.core.errors import InputError
-from warpflat.garment.construction.pockets import Pocket, add_pockets
+from warpflat.garment.construction.details import PocketTable
+from warpflat.garment.construction.pockets import add_pockets
 from warpflat.garment.construction.shaped_band import with_shaped_waistband
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.piece_parts import Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
 
-PATCH = Pocket(kind="patch", where="front", width=0.12, height=0.14, line="hip", below=0.02, from_centre=0.05)
-BAGS = Pocket(kind="inseam", where="side left", width=0.15, height=0.16, below=0.06)
+PATCH = PocketTable(
+    kind="patch", piece="front", width_mm=120, height_mm=140, line="hip", below_mm=20, from_centre_mm=50
+)
+BAGS = PocketTable(kind="inseam", seam="side left", width_mm=150, height_mm=160, below_mm=60)
 
 
 def skirt() -> Pattern:
@@ -47,7 +50,7 @@ def skirt() -> Pattern:
 
 def test_a_patch_becomes_smaller_on_a_short_line_as_a_whole():
     """The line is 400 mm long, of which a fifth is 80: two thirds of the width that is asked for, and of the other lengths."""
-    pattern = add_pockets(skirt(), [replace(PATCH, most_share=0.2)])
+    pattern = add_pockets(skirt(), [PATCH.model_copy(update={"most_share": 0.2})])
     front, patch = pattern.piece("front", ""), pattern.piece("front_pocket", "")
     assert np.ptp(patch.outline[:, 0]) == pytest.approx(0.08)
     assert patch.edge("left side").length == pytest.approx(0.14 * 2 / 3)
@@ -56,9 +59,9 @@ def test_a_patch_becomes_smaller_on_a_short_line_as_a_whole():
     assert sorted(np.abs(marks[:, 0])) == pytest.approx(sorted([*ends, *ends]))
     assert marks[:, 1] == pytest.approx(0.4 - 0.02 * 2 / 3)
     # On a line that is long enough nothing changes.
-    assert np.ptp(add_pockets(skirt(), [replace(PATCH, most_share=0.4)]).piece("front_pocket", "").outline[:, 0]) == (
-        pytest.approx(0.12)
-    )
+    assert np.ptp(
+        add_pockets(skirt(), [PATCH.model_copy(update={"most_share": 0.4})]).piece("front_pocket", "").outline[:, 0]
+    ) == (pytest.approx(0.12))
 
 
 def test_patch_lies_below_its_line_on_both_sides_of_the_centre():
@@ -73,7 +76,8 @@ def test_patch_lies_below_its_line_on_both_sides_of_the_centre():
     assert (patch.quantity, patch.edge("upper").kind) == (2, "hem")
     with pytest.raises(InputError, match=r"pockets\[0\]: a pocket 120 by 140 mm does not lie on 'front' there"):
         add_pockets(
-            skirt(), [Pocket(kind="patch", where="front", width=0.12, height=0.14, line="hip", from_centre=0.3)]
+            skirt(),
+            [PocketTable(kind="patch", piece="front", width_mm=120, height_mm=140, line="hip", from_centre_mm=300)],
         )
 
 
@@ -89,7 +93,7 @@ def test_opening_of_bags_is_notched_on_both_sides_of_the_seam():
             assert min(abs(each - wanted) for each in away) < 1e-4
     assert all(seam.matches for seam in drafted.seams)
     with pytest.raises(InputError, match=r"ends 800 mm along 'side left'"):
-        add_pockets(skirt(), [Pocket(kind="inseam", where="side left", width=0.15, height=0.7, below=0.1)])
+        add_pockets(skirt(), [PocketTable(kind="inseam", seam="side left", width_mm=150, height_mm=400, below_mm=400)])
 
 
 def test_shaped_waistband_and_skirt_are_the_skirt_before():
@@ -113,7 +117,7 @@ def test_shaped_waistband_and_skirt_are_the_skirt_before():
 
 
 def test_welt_has_its_place_and_its_bags():
-    pattern = add_pockets(skirt(), [replace(PATCH, kind="welt", welt=0.02)])
+    pattern = add_pockets(skirt(), [PATCH.model_copy(update={"kind": "welt", "welt_mm": 20})])
     front = pattern.piece("front", "")
     sides = [line for name, line in front.internal_lines.items() if name.startswith("pocket")]
     assert sum(np.linalg.norm(side[1] - side[0]) for side in sides) == pytest.approx(2 * 2 * (0.12 + 0.02))
@@ -130,7 +134,7 @@ def test_hip_pocket_cuts_the_corner_off_and_puts_a_facing_in_its_place():
         sides=((SeamSide(piece="back", edge="waist"),), (SeamSide(piece="front", edge="waist"),)),
     )
     whole = replace(whole, seams=[*whole.seams, waist])
-    pattern = add_pockets(whole, [Pocket(kind="hip", where="side left", width=0.05, height=0.14)])
+    pattern = add_pockets(whole, [PocketTable(kind="hip", seam="side left", width_mm=50, height_mm=140)])
     drafted = draft_garment(pattern)
     assert all(seam.matches for seam in drafted.seams if seam.name != "side right")
     lost = area - shapely.Polygon(pattern.piece("front", "").outline).area
@@ -147,6 +151,6 @@ def test_hip_pocket_cuts_the_corner_off_and_puts_a_facing_in_its_place():
     assert len(parts) == 3
     assert sum(parts) == pytest.approx(whole.piece("front", "").edge("waist").length, abs=1e-5)
     with pytest.raises(InputError, match="'side middle'"):
-        add_pockets(whole, [Pocket(kind="hip", where="side middle", width=0.05, height=0.14)])
+        add_pockets(whole, [PocketTable(kind="hip", seam="side middle", width_mm=50, height_mm=140)])
     with pytest.raises(InputError, match="which is"):
-        add_pockets(whole, [Pocket(kind="hip", where="side left", width=0.05, height=0.7)])
+        add_pockets(whole, [PocketTable(kind="hip", seam="side left", width_mm=400, height_mm=140)])

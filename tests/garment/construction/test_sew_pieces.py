@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 from obj_files import write_obj
+from surface_meshes import quads_between
 
 from warpflat.app.cli.summary import notes_line
 from warpflat.app.scene.load import make_scene
@@ -40,8 +41,7 @@ def _barrel() -> dict[str, trimesh.Trimesh]:
         points = np.stack(
             [radius * np.cos(a)[:, None], np.broadcast_to(0.4 * v, (17, 13)), radius * np.sin(a)[:, None]], axis=-1
         )
-        at = np.arange(17 * 13).reshape(17, 13)
-        quads = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 4)
+        quads = quads_between((17, 13))
         triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
         parts[name] = trimesh.Trimesh(points.reshape(-1, 3).round(9), triangles, process=False)
     parts["button"] = trimesh.creation.icosphere(1, 0.01)
@@ -146,8 +146,7 @@ def test_a_piece_cut_turned_over_hangs_on_its_side_where_the_mesh_stands_aside_a
         points = np.stack(
             [radius * np.cos(a)[:, None], np.broadcast_to(0.4 * v, (count, 9)), radius * np.sin(a)[:, None]], axis=-1
         ).reshape(-1, 3)
-        at = np.arange(count * 9).reshape(count, 9)
-        quads = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 4)
+        quads = quads_between((count, 9))
         # Diagonals are mirror images, too.
         left = points[quads].mean(axis=1)[:, 0] > 0.0
         first = np.where(left[:, None], quads[:, [0, 1, 2]], quads[:, [0, 1, 3]])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import shapely
 from devices import DEVICE
+from surface_meshes import quads_between
 
 from warpflat.flat.flattening.flatten_piece import flatten
 from warpflat.flat.flattening.result import Flattening
@@ -19,8 +20,7 @@ ALONG, ACROSS = 31, 4
 
 
 def band(place: np.ndarray, name: str) -> Flattening:
-    n = np.arange(ALONG * ACROSS).reshape(ALONG, ACROSS)
-    faces = np.stack([n[:-1, :-1], n[1:, :-1], n[1:, 1:], n[:-1, 1:]], axis=-1).reshape(-1, 4)
+    faces = quads_between((ALONG, ACROSS), turned=True)
     return flatten(make_surface(place.reshape(-1, 3), faces, name=name), device=DEVICE)
 
 

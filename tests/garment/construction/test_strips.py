@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,16 +10,15 @@ from flat_forms import flat_form, pattern_of, whole_draft
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
-from warpflat.garment.construction.finishing import Finishing
+from warpflat.garment.construction.details import FinishingTable, OpeningTable
 from warpflat.garment.construction.garment import Garment
-from warpflat.garment.construction.openings import Opening
 from warpflat.garment.construction.strips import Strip, swept
 from warpflat.pattern.drafting.fitting import drawn_length
 from warpflat.pattern.drafting.half_pieces import halved
 from warpflat.pattern.drafting.pieces import Pattern
 from warpflat.pattern.drafting.sewing_order import notions, sewing_steps
 
-ZIP = Opening(kind="zip", line="centre back", length=0.3)
+ZIP = OpeningTable(kind="zip", seam="centre back", length_mm=300)
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +47,7 @@ def test_curved_strip_has_the_length_of_its_edge_and_its_outer_edge_follows_from
 
 def test_rib_takes_the_place_of_a_strip_along_the_hem(shirt: Garment):
     plain = pattern_of(shirt)
-    rib = Finishing(kind="band", edge="hip", width=0.06, share=0.85, shorten=0.06)
+    rib = FinishingTable(kind="band", edge="hip", width_mm=60, share=0.85, shorten_mm=60)
     pattern = pattern_of(shirt, rib)
     side = ("front", "side left")
     assert plain.piece(side[0], "").edge(side[1]).length - pattern.piece(side[0], "").edge(side[1]).length == (
@@ -64,7 +62,9 @@ def test_rib_takes_the_place_of_a_strip_along_the_hem(shirt: Garment):
 
 
 def test_cuff_is_buttoned_behind_where_the_sleeve_is_slit(shirt: Garment):
-    cuff = Finishing(kind="cuff", edge="wrist", width=0.06, share=0.8, overlap=0.025, shorten=0.05, placket=0.11)
+    cuff = FinishingTable(
+        kind="cuff", edge="wrist", width_mm=60, share=0.8, overlap_mm=25, shorten_mm=50, placket_mm=110
+    )
     pattern = pattern_of(shirt, cuff)
     piece = pattern.piece("cuff", "")
     assert piece.quantity == 2
@@ -93,11 +93,11 @@ def test_cuff_is_buttoned_behind_where_the_sleeve_is_slit(shirt: Garment):
     assert any("buttonhole at one end" in step and "cuff" in step for step in steps)
     assert "2 small buttons" in notions(sewing_steps(whole_draft(pattern), ""))
     with pytest.raises(InputError, match="does not lie within the piece"):
-        pattern_of(shirt, replace(cuff, placket=0.9))
+        pattern_of(shirt, cuff.model_copy(update={"placket_mm": 900}))
 
 
 def test_ruffle_is_gathered_itself(shirt: Garment):
-    pattern = pattern_of(shirt, Finishing(kind="ruffle", edge="hip", width=0.1, share=2.2))
+    pattern = pattern_of(shirt, FinishingTable(kind="ruffle", edge="hip", width_mm=100, share=2.2))
     found = lengths(pattern)["hip ruffle"]
     assert found[1] == pytest.approx(2.2 * found[0], abs=0.1)
     assert pattern.piece("hip_ruffle", "").edge("upper").kind == "hem"
@@ -106,7 +106,7 @@ def test_ruffle_is_gathered_itself(shirt: Garment):
 
 @pytest.mark.parametrize("turns", [0.5, 1.0])
 def test_flounce_has_a_panel_for_each_piece_and_the_hem_of_a_ring(half_skirt: Garment, turns: float):
-    pattern = pattern_of(half_skirt, Finishing(kind="flounce", edge="knee", width=0.2, turns=turns))
+    pattern = pattern_of(half_skirt, FinishingTable(kind="flounce", edge="knee", width_mm=200, turns=turns))
     found = lengths(pattern)
     assert {"front knee flounce", "back knee flounce", "side left of the flounce"} <= set(found)
     panels = [piece for piece in pattern.pieces[""] if piece.name.endswith("flounce")]
@@ -116,11 +116,11 @@ def test_flounce_has_a_panel_for_each_piece_and_the_hem_of_a_ring(half_skirt: Ga
     hem = 2.0 * sum(piece.edge("hem").length for piece in panels)
     assert hem - inner == pytest.approx(2.0 * np.pi * turns * 0.2, rel=1e-3)
     with pytest.raises(InputError, match="take fewer turns"):
-        pattern_of(half_skirt, Finishing(kind="flounce", edge="knee", width=0.2, turns=2.5))
+        pattern_of(half_skirt, FinishingTable(kind="flounce", edge="knee", width_mm=200, turns=2.5))
 
 
 def test_casing_is_turned_in_and_has_an_elastic_of_the_body(half_skirt: Garment):
-    pattern = pattern_of(half_skirt, Finishing(kind="casing", edge="waist", width=0.03, elastic=0.9))
+    pattern = pattern_of(half_skirt, FinishingTable(kind="casing", edge="waist", width_mm=30, elastic=0.9))
     edge = pattern.piece("front", "").edge("waist")
     assert (edge.kind, edge.width) == ("hem", pytest.approx(0.04))
     assert half_skirt.mannequin is not None
@@ -130,11 +130,11 @@ def test_casing_is_turned_in_and_has_an_elastic_of_the_body(half_skirt: Garment)
     assert any("thread elastic" in step.words for step in sewing_steps(drafted, ""))
     assert any("elastic" in notion for notion in notions(sewing_steps(drafted, "")))
     with pytest.raises(InputError, match="no free edge 'hip'"):
-        pattern_of(half_skirt, Finishing(kind="casing", edge="hip", width=0.03, elastic=0.9))
+        pattern_of(half_skirt, FinishingTable(kind="casing", edge="hip", width_mm=30, elastic=0.9))
 
 
 def test_pleats_of_a_ruffle_lie_beside_each_other(half_skirt: Garment):
-    wish = Finishing(kind="ruffle", edge="knee", width=0.2, share=3.0, pleat=0.05)
+    wish = FinishingTable(kind="ruffle", edge="knee", width_mm=200, share=3.0, pleat_mm=50)
     pattern = pattern_of(half_skirt, wish)
     ruffle = pattern.piece("knee_ruffle", "")
     whole = ruffle.edge("lower").length
@@ -152,7 +152,7 @@ def test_pleats_of_a_ruffle_lie_beside_each_other(half_skirt: Garment):
 
 @pytest.mark.parametrize(("cloth", "count"), [(1.4, 3), (0.9, 4), (4.0, 1)])
 def test_strip_that_is_wider_than_the_cloth_is_cut_as_equal_panels(shirt: Garment, cloth: float, count: int):
-    wish = Finishing(kind="ruffle", edge="hip", width=0.2, share=3.0, pleat=0.04)
+    wish = FinishingTable(kind="ruffle", edge="hip", width_mm=200, share=3.0, pleat_mm=40)
     pattern = pattern_of(shirt, wish, cloth_width=cloth)
     panel = pattern.piece("hip_ruffle", "")
     assert panel.quantity == count
@@ -185,7 +185,7 @@ def test_strip_that_is_wider_than_the_cloth_is_cut_as_equal_panels(shirt: Garmen
 
 
 def test_flounce_that_is_wider_than_the_cloth_is_cut_as_equal_panels(shirt: Garment):
-    wish = Finishing(kind="flounce", edge="hip", width=0.6, turns=1.0)
+    wish = FinishingTable(kind="flounce", edge="hip", width_mm=600, turns=1.0)
     pattern = pattern_of(shirt, wish, cloth_width=1.15)
     panels = [piece for piece in pattern.pieces[""] if "flounce" in piece.name]
     assert max(piece.quantity for piece in panels) > 1

@@ -9,19 +9,20 @@ import pytest
 from bodies import body_of_size
 from flat_forms import pattern_of, whole_draft
 
-from warpflat.app.scene.openings import straight_stands
 from warpflat.core.errors import InputError
-from warpflat.garment.construction.finishing import Finishing, finish_edges
+from warpflat.garment.construction.constraints import straight_stands
+from warpflat.garment.construction.details import FinishingTable, OpeningTable
+from warpflat.garment.construction.finishing import finish_edges
 from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.garment import Garment
-from warpflat.garment.construction.openings import Opening, part_at_centres
+from warpflat.garment.construction.openings import part_at_centres
 from warpflat.garment.mannequin.forms import Form, PieceRecipe, shipped_form
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.sewing_order import sewing_steps
 
-WRAP = Opening(kind="wrap", line="centre front", length=float("inf"), width=0.09, tie=0.8)
-GODETS = [Opening(kind="godet", line=f"side {side}", length=0.2, width=0.25) for side in ("left", "right")]
+WRAP = OpeningTable(kind="wrap", seam="centre front", width_mm=90, tie_mm=800)
+GODETS = [OpeningTable(kind="godet", seam=f"side {side}", length_mm=200, width_mm=250) for side in ("left", "right")]
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +30,7 @@ def mannequin() -> Mannequin:
     return body_of_size(30.0)
 
 
-def flattened(mannequin: Mannequin, form: Form, *openings: Opening) -> Garment:
+def flattened(mannequin: Mannequin, form: Form, *openings: OpeningTable) -> Garment:
     built = mannequin.form(part_at_centres(mannequin.layout, form, openings))
     made = flatten_form(mannequin, built, fabric="denim", curves_mm=0.0, constraints=straight_stands(built, openings))
     return replace(made, openings=openings)
@@ -76,7 +77,7 @@ def test_godets_left_edge_is_sewn_to_the_piece_on_its_left(skirt: Garment):
 
 
 def test_ruffle_goes_along_the_godet_too(skirt: Garment):
-    ruffle = Finishing(kind="ruffle", edge="knee", width=0.1, share=1.5)
+    ruffle = FinishingTable(kind="ruffle", edge="knee", width_mm=100, share=1.5)
     made = [replace(skirt, openings=openings, finishing=(ruffle,)) for openings in ((), tuple(GODETS))]
     strips = [pattern_of(each).piece("knee_ruffle", "") for each in made]
     lengths = [strip.quantity * strip.edge("lower").length for strip in strips]
@@ -84,7 +85,7 @@ def test_ruffle_goes_along_the_godet_too(skirt: Garment):
 
 
 def test_slanted_hem_cuts_godets_too(skirt: Garment):
-    wish = slanted({"side left": 0.1, "side right": 0.0})
+    wish = slanted({"side left": 100, "side right": 0})
     pattern = pattern_of(skirt, wish, openings=GODETS)
     wedges = [piece for piece in pattern.pieces[""] if piece.name.startswith("godet")]
     assert sorted(round(piece.edge("left").length, 2) for piece in wedges) == [0.1, 0.2]
@@ -92,13 +93,13 @@ def test_slanted_hem_cuts_godets_too(skirt: Garment):
 
 
 def test_seam_has_one_opening_at_its_lower_end(skirt: Garment):
-    slit = replace(GODETS[0], kind="slit", width=0.015)
+    slit = GODETS[0].model_copy(update={"kind": "slit", "width_mm": 15})
     with pytest.raises(InputError, match=r"openings\[1\]: the lower end of 'side left' is open already"):
         pattern_of(skirt, openings=(slit, GODETS[0]))
 
 
 def test_godet_needs_a_hem(wrapped: Garment):
-    godet = Opening(kind="godet", line="bodice side left", length=0.1, width=0.1)
+    godet = OpeningTable(kind="godet", seam="bodice side left", length_mm=100, width_mm=100)
     with pytest.raises(
         InputError, match="a godet runs out into a hem; 'bodice side left' ends at 'waist', which is sewn"
     ):
@@ -109,8 +110,8 @@ def test_half_on_the_fold_has_no_hem_that_slants_to_one_side(mannequin: Mannequi
     form = mannequin.form(shipped_form("a_line_skirt"), half=True)
     garment = flatten_form(mannequin, form, fabric="denim", curves_mm=0.0)
     with pytest.raises(InputError, match="cannot be shorter on one side"):
-        pattern_of(garment, slanted({"side left": 0.2, "side right": 0.0}))
-    cut = pattern_of(garment, slanted({"side": 0.1, "centre front": 0.0}))
+        pattern_of(garment, slanted({"side left": 200, "side right": 0}))
+    cut = pattern_of(garment, slanted({"side": 100, "centre front": 0}))
     whole_draft(cut)
 
 
@@ -136,7 +137,7 @@ def test_wrap_lies_over_the_other_half(wrapped: Garment):
 
 
 def test_wrapped_neckline_is_bound_from_one_side_to_the_other(wrapped: Garment):
-    bound = finish_edges(pattern_of(wrapped), [Finishing(kind="binding", edge="neck", width=0.035)])
+    bound = finish_edges(pattern_of(wrapped), [FinishingTable(kind="binding", edge="neck", width_mm=35)])
     assert bound.piece("neck_binding", "").quantity == 1
     seam = next(seam for seam in bound.seams if seam.name == "neck binding")
     assert len(seam.sides[1]) == 3
@@ -145,15 +146,15 @@ def test_wrapped_neckline_is_bound_from_one_side_to_the_other(wrapped: Garment):
 
 def test_wrap_that_is_too_wide_is_named(wrapped: Garment):
     with pytest.raises(InputError, match=r"too short for a wrap of 300 mm"):
-        pattern_of(replace(wrapped, openings=(replace(WRAP, width=0.3),)))
+        pattern_of(replace(wrapped, openings=(WRAP.model_copy(update={"width_mm": 300}),)))
 
 
-def slanted(rises: dict[str, float], kind: str = "hem") -> Finishing:
-    return Finishing(kind=kind, edge="knee", width=0.05, shorten=rises)
+def slanted(rises_mm: dict[str, float], kind: str = "hem", **more: object) -> FinishingTable:
+    return FinishingTable(kind=kind, edge="knee", shorten_mm=rises_mm, **more)  # type: ignore[arg-type]
 
 
 def test_slanted_hem_is_higher_on_one_side(skirt: Garment):
-    wish = slanted({"side left": 0.2, "side right": 0.0})
+    wish = slanted({"side left": 200, "side right": 0})
     pattern = pattern_of(skirt)
     cut = finish_edges(pattern, [wish])
     for name in ("front", "back"):
@@ -166,11 +167,11 @@ def test_slanted_hem_is_higher_on_one_side(skirt: Garment):
         assert cut.piece(name, "").edge("knee").kind == "hem"
     whole_draft(cut)
     assert wish.is_one_sided
-    assert not slanted({"side left": 0.2, "side right": 0.2}).is_one_sided
+    assert not slanted({"side left": 200, "side right": 200}).is_one_sided
 
 
 def test_hem_that_is_higher_in_front_has_no_corner_there(skirt: Garment):
-    cut = finish_edges(pattern_of(skirt), [slanted({"centre front": 0.15, "centre back": 0.0})])
+    cut = finish_edges(pattern_of(skirt), [slanted({"centre front": 150, "centre back": 0})])
     knee = cut.piece("front", "").edge("knee").points
     top = int(knee[:, 1].argmax())
     assert 0 < top < len(knee) - 1
@@ -180,27 +181,27 @@ def test_hem_that_is_higher_in_front_has_no_corner_there(skirt: Garment):
 
 
 def test_ruffle_takes_the_place_of_what_a_slanted_hem_loses(skirt: Garment):
-    rises = {"side left": 0.2, "side right": 0.05}
-    sewn = finish_edges(pattern_of(skirt), [replace(slanted(rises, "ruffle"), share=1.5)])
+    rises = {"side left": 200, "side right": 50}
+    sewn = finish_edges(pattern_of(skirt), [slanted(rises, "ruffle", width_mm=50, share=1.5)])
     ruffle = sewn.piece("knee_ruffle", "")
     assert ruffle.quantity * ruffle.edge("lower").length > 1.4
     whole_draft(sewn)
 
 
 def test_a_slanted_hem_keeps_the_mark_of_the_tie_on_the_outline(wrapped: Garment):
-    cut = finish_edges(pattern_of(wrapped), [slanted({"side": 0.1, "centre back": 0.0})])
+    cut = finish_edges(pattern_of(wrapped), [slanted({"side": 100, "centre back": 0})])
     assert "tie" in cut.piece("front_skirt_left", "").marks
 
 
 def test_line_that_meets_no_hem_is_named(skirt: Garment):
     with pytest.raises(InputError, match="no line 'cuff' meets 'knee'"):
-        finish_edges(pattern_of(skirt), [slanted({"cuff": 0.1})])
+        finish_edges(pattern_of(skirt), [slanted({"cuff": 100})])
     with pytest.raises(InputError, match="are shorter than 700 mm"):
-        finish_edges(pattern_of(skirt), [slanted({"side left": 0.7})])
+        finish_edges(pattern_of(skirt), [slanted({"side left": 700})])
 
 
 def test_line_drawing_shows_the_slanted_hem(skirt: Garment):
-    worn = pattern_of(skirt, slanted({"side left": 0.2, "side right": 0.0})).worn
+    worn = pattern_of(skirt, slanted({"side left": 200, "side right": 0})).worn
     assert worn is not None
     for side, sign in (("front", 1.0), ("back", -1.0)):
         points = np.concatenate([ring for piece in worn.views[side] for ring in piece.outlines])

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from surface_meshes import quads_between
 
 from warpflat.core.errors import InputError
 from warpflat.flat.surface.io.raw_mesh import RawMesh
@@ -90,7 +91,7 @@ def test_cloth_that_hangs_is_taken_off_its_weight() -> None:
     hang = 0.03
     u, y = (each.ravel() for each in np.meshgrid(np.linspace(0.0, 0.2, 11), np.linspace(0.0, 0.6, 241)))
     at = np.arange(2651).reshape(241, 11)
-    faces = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 4)
+    faces = quads_between(at)
     worn = np.column_stack([u, y + 0.5 * hang * y**2, np.zeros(len(u))])
     panel = SewnPanel(
         surface=make_surface(worn, faces), cut=np.column_stack([u, y]), unit="m",

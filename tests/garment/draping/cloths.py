@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import warp as wp
 from devices import DEVICE
+from surface_meshes import quads_between
 
 from warpflat.flat.fabric.fabric import Fabric
 from warpflat.garment.draping.body import Body
@@ -23,8 +24,7 @@ def cloth_of(**changes: float) -> Fabric:
 
 def grid(rows: int, columns: int) -> np.ndarray:
     """The faces of a grid of vertices, row by row."""
-    i = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
-    return np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    return quads_between((rows, columns))
 
 
 def sheet(flat: np.ndarray, space: np.ndarray, faces: np.ndarray, fabric: Fabric) -> SewnCloth:

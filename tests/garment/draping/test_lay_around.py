@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from bodies import body_of_size
-from plain_patterns import ARMHOLE, SLEEVE, TOP, polygon, sewn, top
+from plain_patterns import ARMHOLE, SLEEVE, TOP, top
+from polygons import polygon, sewn
 
 import warpflat
 from warpflat.core.errors import InputError

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,7 +12,9 @@ import pytest
 from bodies import body_of_size
 from devices import DEVICE
 from obj_files import write_obj
-from plain_patterns import sewn
+from polygons import corners_of, sewn
+from polygons import polygon as polygon_from
+from surface_meshes import quads_between
 
 import warpflat
 from warpflat.app.scene.outside_pattern import OutsideJob
@@ -32,12 +35,8 @@ from warpflat.pattern.export.read_dxf import read_dxf
 from warpflat.pattern.export.read_svg import read_svg
 from warpflat.pattern.export.svg import write_svg
 
-
-def polygon(name: str, corners: list[tuple[float, float]], **more: object) -> Piece:
-    """A piece whose edges e1, e2 ... join its corners."""
-    ring = np.array([*corners, corners[0]], dtype=float)
-    edges = [Edge(name=f"e{k + 1}", points=ring[k : k + 2]) for k in range(len(corners))]
-    return Piece(name=name, edges=edges, **more)  # type: ignore[arg-type]
+# Edges of a file are counted from 1.
+polygon = partial(polygon_from, first=1)
 
 
 def seam(name: str, first: str, second: str, ease: float = 0.0) -> Seam:
@@ -46,8 +45,7 @@ def seam(name: str, first: str, second: str, ease: float = 0.0) -> Seam:
 
 def tube(width: float, height: float, **more: object) -> Pattern:
     """Two rectangles and their side seams."""
-    corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)]
-    pieces = [polygon(name, corners, **more) for name in ("front", "back")]
+    pieces = [polygon(name, corners_of(width, height), **more) for name in ("front", "back")]
     seams = [seam("side left", "front.e2", "back.e4"), seam("side right", "back.e2", "front.e4")]
     return Pattern(name="tube", pieces={"": pieces}, seams=seams)
 
@@ -61,7 +59,7 @@ def darted(legs: str = "dart") -> Piece:
 
 def test_both_sides_of_a_seam_get_the_same_points():
     """One side is eased by 10 % and has two edges, between which a dart is closed."""
-    other = polygon("yoke", [(0.0, 0.0), (0.33, 0.0), (0.33, 0.1), (0.0, 0.1)])
+    other = polygon("yoke", corners_of(0.33, 0.1))
     joined = seam("yoke", "yoke.e1", "front.e6 + front.e3", ease=0.36 / 0.33 - 1.0)
     pieces, seams, notes = whole_pieces([darted(), other, polygon("spare", [(0, 0), (1, 0), (0, 1)])], [joined])
     assert notes == ["left out, as no seam joins them: spare"]
@@ -119,7 +117,7 @@ def test_halves_and_pairs_are_made_whole():
 
 @pytest.mark.parametrize("ending", ["dxf", "svg"])
 def test_a_file_of_the_package_names_its_seams(ending: str, tmp_path: Path):
-    other = polygon("yoke", [(0.0, 0.0), (0.33, 0.0), (0.33, 0.1), (0.0, 0.1)])
+    other = polygon("yoke", corners_of(0.33, 0.1))
     given = Pattern(
         name="trial", pieces={"": [darted(), other]},
         seams=[seam("yoke", "yoke.e1", "front.e6 + front.e3", ease=0.36 / 0.33 - 1.0)],
@@ -352,10 +350,9 @@ def test_a_half_is_lifted_to_both_sides_of_its_surface(tmp_path: Path):
     radius = 0.1
     x, y = (each.ravel() for each in np.meshgrid(np.linspace(0.0, 0.157, 30), np.linspace(0.0, 0.2, 5)))
     space = np.column_stack([radius * np.sin(x / radius), y, radius * np.cos(x / radius)])
-    i = np.arange(150).reshape(5, 30)
-    faces = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    faces = quads_between((5, 30))
     write_obj(tmp_path / "front.obj", (space, faces), texture=[np.stack([x, y], axis=1)], digits="")
-    half = polygon("front", [(0.0, 0.0), (0.157, 0.0), (0.157, 0.2), (0.0, 0.2)])
+    half = polygon("front", corners_of(0.157, 0.2))
     half = Piece(name="front", edges=[*half.edges[:3], Edge(name="fold", points=half.edges[3].points, kind="fold")])
     lifts = whole_lifts([half], {"front": read_lift(tmp_path / "front.obj")})
     points = np.array([[0.1, 0.13], [-0.1, 0.13], [-0.03, 0.02]])
@@ -424,7 +421,7 @@ def test_a_band_goes_on_beyond_its_seam_as_the_cloth_does(top: str):
     radius, wide, tall = 0.1, 0.2 * np.pi, 0.2
     band = [(0.0, 0.0), (wide, 0.0), (wide, 0.05), (0.0, 0.05)]
     pieces = {
-        "tube": polygon("tube", [(0.0, 0.0), (wide, 0.0), (wide, tall), (0.0, tall)]),
+        "tube": polygon("tube", corners_of(wide, tall)),
         "band": polygon("band", band),
         "fall": polygon("fall", [(x, 2.0 * y) for x, y in band]),
     }

@@ -15,10 +15,8 @@ from warpflat.core.errors import InputError
 from warpflat.flat.surface.connectivity import border_loops, join_labels
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.triangles import triangulate
-from warpflat.garment.construction.collars import Collar
-from warpflat.garment.construction.finishing import Finishing
+from warpflat.garment.construction.details import FinishingTable, PocketTable
 from warpflat.garment.construction.form_garment import FormGarment, flatten_form
-from warpflat.garment.construction.pockets import Pocket
 from warpflat.garment.construction.to_pattern import pattern_of_garment
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.continue_pieces import continue_pieces, hood_beside_head
@@ -542,8 +540,8 @@ def placed_on(form: str, **more: object) -> tuple[FormGarment, dict[str, list[Su
 
 def test_a_flounce_falls_from_its_edge_and_a_waistband_stands_on_it():
     wishes = [
-        Finishing(kind="waistband", edge="waist", width=0.03),
-        Finishing(kind="flounce", edge="knee", width=0.2, turns=0.5),
+        FinishingTable(kind="waistband", edge="waist", width_mm=30),
+        FinishingTable(kind="flounce", edge="knee", width_mm=200, turns=0.5),
     ]
     garment, worn = placed_on("skirt", finishing=wishes)
     cloth = np.concatenate([piece.surface.vertices for piece in garment.pieces.values()])
@@ -560,7 +558,7 @@ def test_a_flounce_falls_from_its_edge_and_a_waistband_stands_on_it():
 
 
 def test_a_patch_lies_on_its_piece():
-    pocket = Pocket(kind="patch", where="front", width=0.12, height=0.1, line="abdomen", below=0.01)
+    pocket = PocketTable(kind="patch", piece="front", width_mm=120, height_mm=100, line="abdomen", below_mm=10)
     garment, worn = placed_on("skirt", pockets=[pocket])
     (name,) = worn
     assert name == "front_pocket"
@@ -572,9 +570,7 @@ def test_a_patch_lies_on_its_piece():
 
 
 def test_a_turned_down_collar_lies_on_the_garment():
-    collar = Finishing(
-        kind="collar", edge="neck", width=0.07, placket=0.14, collar=Collar(style="convertible", width=0.07)
-    )
+    collar = FinishingTable(kind="collar", edge="neck", style="convertible", width_mm=70, placket_mm=140)
     garment, worn = placed_on("shirt", finishing=[collar])
     surfaces = [piece.surface for piece in garment.pieces.values()]
     first = np.cumsum([0, *(len(surface.vertices) for surface in surfaces)])

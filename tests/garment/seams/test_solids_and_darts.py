@@ -339,6 +339,17 @@ def test_trousers_as_tight_as_a_skin_have_darts_and_no_panel_more() -> None:
     assert (area * [piece.fit.outside for piece in flat]).sum() < 0.03 * area.sum()
 
 
+def test_a_body_is_left_out_and_is_no_button(tmp_path: Path) -> None:
+    body = trimesh.creation.icosphere(3)
+    body.apply_scale([0.18, 0.85, 0.12])
+    vertices, faces = solids.skirt().vertices, solids.skirt().faces
+    worn = warpflat.make_surface(vertices - vertices.mean(axis=0), faces, name="skirt")
+    path = write_obj(tmp_path / "worn.obj", worn, body)
+    (layer,) = warpflat.read_layers(path, units="m")
+    assert any(note.startswith("a body, 1.70 m tall, left out") for note in layer.notes)
+    assert not any("small part" in note for note in layer.notes)
+
+
 def test_two_layers_are_worn_the_same_way_up(tmp_path: Path) -> None:
     shirt, skirt = solids.shirt(step=0.045), solids.skirt()
     path = write_obj(tmp_path / "two.obj", shirt, skirt, trimesh.creation.icosphere(1, radius=0.005))

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from polygons import corners_of, polygon, sewn
 
 from warpflat.core.arrays import FloatArray
 from warpflat.pattern.drafting.curves import chords, fit_curve
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.fitting import SHIFT, equal_sides
 from warpflat.pattern.drafting.piece_parts import Edge
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam
 
 
 def arc(radius: float, turn: float, count: int) -> FloatArray:
@@ -19,15 +20,11 @@ def arc(radius: float, turn: float, count: int) -> FloatArray:
 
 
 def seam(ease: float = 0.0) -> Seam:
-    return Seam(
-        name="s", sides=((SeamSide(piece="a", edge="e"),), (SeamSide(piece="b", edge="e", reversed=True),)), ease=ease
-    )
+    return sewn("a.e", "b.e", "s", ease=ease)
 
 
 def square(name: str, role: str = "shell") -> Piece:
-    corners = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1], [0.0, 0.0]])
-    edges = [Edge(name=each, points=corners[k : k + 2]) for k, each in enumerate(("e", "right", "top", "left"))]
-    return Piece(name=name, edges=edges, role=role)
+    return polygon(name, corners_of(0.1, 0.1), names=("e", "right", "top", "left"), role=role)
 
 
 PIECES = (square("a"), square("b"))

@@ -11,6 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
+from polygons import corners_of, polygon, sides
+from polygons import drafted as drafted_alone
 from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
@@ -26,6 +28,9 @@ from warpflat.pattern.drafting.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
 
 SIZES = ("36", "38", "40", "42", "44")
+# A square of 300 mm with a dart from its lower side, and the kinds of its edges.
+DARTED = [(0, 0), (0.1, 0), (0.15, 0.1), (0.2, 0), (0.3, 0), (0.3, 0.3), (0, 0.3)]
+KINDS = ("seam", "dart", "dart", "seam", "seam", "seam", "seam")
 
 
 @pytest.fixture(scope="module")
@@ -34,9 +39,7 @@ def dress():
 
 
 def square(name="square", size="", **options):
-    corners = np.array([(0, 0), (0.2, 0), (0.2, 0.3), (0, 0.3), (0, 0)], dtype=float)
-    names = ("bottom", "right", "top", "left")
-    edges = [Edge(name=n, points=corners[i : i + 2]) for i, n in enumerate(names)]
+    edges = sides(corners_of(0.2, 0.3), names=("bottom", "right", "top", "left"))
     return Piece(name=name, size=size, edges=options.pop("edges", edges), **options)
 
 
@@ -107,8 +110,7 @@ def test_a_joint_is_notched_opposite_to_itself_where_only_a_part_of_a_seam_is_ea
     whole, ease, eased, joint = 0.5, 0.16, (0.1, 0.5), 0.2
 
     def block(name, height):
-        corners = np.array([[0.0, 0.0], [0.3, 0.0], [0.3, height], [0.0, height]])
-        return Piece(name=name, edges=[Edge(name=f"e{k}", points=corners[[k, (k + 1) % 4]]) for k in range(4)])
+        return polygon(name, corners_of(0.3, height))
 
     def along(share):
         return share + ease * np.clip((share - eased[0]) / (eased[1] - eased[0]), 0.0, 1.0)
@@ -199,11 +201,10 @@ def test_curves_leave_their_points_only_where_the_seam_demands_it():
         for name, points in (("round", round_edge), ("straight", straight)):
             top = points[[-1, 0]] + [[0.0, 0.2], [0.0, 0.2]]
             corners = [points[-1], top[0], top[1], points[0]]
-            others = [Edge(name=f"e{k}", points=np.stack(corners[k : k + 2])) for k in range(3)]
+            others = sides(corners, closed=False)
             pieces.append(Piece(name=name, edges=[Edge(name="sewn", points=points, vertices=ids), *others]))
-        sides = ((SeamSide(piece="round", edge="sewn"),), (SeamSide(piece="straight", edge="sewn"),))
-        garment = Pattern(name="two", pieces={"": pieces}, seams=[Seam(name="s", sides=sides)])
-        drafted = draft_garment(garment)
+        both = ((SeamSide(piece="round", edge="sewn"),), (SeamSide(piece="straight", edge="sewn"),))
+        drafted = drafted_alone(*pieces, seams=[Seam(name="s", sides=both)])
         assert drafted.seams[0].matches, step
         assert (drafted.pieces[""][0].edge("sewn").fit_error <= 1e-4) == near, step
 
@@ -275,10 +276,10 @@ def test_darts_get_a_drill_hole_at_the_tip_and_a_notch_at_each_leg(dress):
 
 
 def test_notches_of_a_dart_through_a_straight_hem_stand_as_its_legs_do_above_it():
-    corners = np.array([(0, 0), (0.15, 0), (0.18, 0.2), (0.21, 0), (0.36, 0), (0.36, 0.3), (0, 0.3), (0, 0)])
+    corners = [(0, 0), (0.15, 0), (0.18, 0.2), (0.21, 0), (0.36, 0), (0.36, 0.3), (0, 0.3)]
     kinds = ("hem", "dart", "dart", "hem", "seam", "seam", "seam")
-    edges = [Edge(name=f"e{i}", points=corners[i : i + 2], kind=k, allowance=0.04) for i, k in enumerate(kinds)]
-    piece = draft_piece(Piece(name="p", edges=edges, darts=[Dart(name="d", left="e1", right="e2")]))
+    darts = [Dart(name="d", left="e1", right="e2")]
+    piece = draft_piece(polygon("p", corners, kinds=kinds, widths=7 * [0.04], darts=darts))
     left, right = (next(n.base[0] for n in piece.notches if n.edge == leg) for leg in ("e1", "e2"))
     assert left[1] == pytest.approx(-0.04, abs=1e-6)
     # 60 mm at the hem, 48 mm 40 mm above it, and as much where that much is turned up.
@@ -286,10 +287,7 @@ def test_notches_of_a_dart_through_a_straight_hem_stand_as_its_legs_do_above_it(
 
 
 def test_a_wide_dart_is_cut_out_with_allowances_on_its_legs():
-    corners = np.array([(0, 0), (0.1, 0), (0.15, 0.1), (0.2, 0), (0.3, 0), (0.3, 0.3), (0, 0.3), (0, 0)], dtype=float)
-    names = ("a", "l", "r", "b", "right", "top", "left")
-    kinds = ("seam", "dart", "dart", "seam", "seam", "seam", "seam")
-    edges = [Edge(name=n, points=corners[i : i + 2], kind=k) for i, (n, k) in enumerate(zip(names, kinds, strict=True))]
+    edges = sides(DARTED, names=("a", "l", "r", "b", "right", "top", "left"), kinds=KINDS)
     piece = draft_piece(Piece(name="p", edges=edges, darts=[Dart(name="d", left="l", right="r", cut=True)]))
     assert piece.edge("l").width == 0.010
     assert "Includes seam 1 cm" in [text for text, _ in piece.label.lines]
@@ -313,12 +311,10 @@ def curved_dart(mouth, bends=(0.08, 0.08), length=0.1):
     )
     corners = np.array([ends[1], (0.3, 0), (0.3, 0.3), (0, 0.3), (0, 0), ends[0]])
     edges = [Edge(name="l", points=left, kind="dart"), Edge(name="r", points=right[::-1], kind="dart")]
-    edges += [Edge(name=f"e{i}", points=corners[i : i + 2]) for i in range(5)]
-    return draft_garment(
-        Pattern(
-            name="g", pieces={"": [Piece(name="p", edges=edges, darts=[Dart(name="d", left="l", right="r", cut=True)])]}
-        )
-    ).pieces[""][0]
+    piece = Piece(
+        name="p", edges=edges + sides(corners, closed=False), darts=[Dart(name="d", left="l", right="r", cut=True)]
+    )
+    return drafted_alone(piece).pieces[""][0]
 
 
 @pytest.mark.parametrize("bends", [(0.08, -0.08), (0.08, 0.08), (-0.05, -0.05), (0.06, 0.05)])
@@ -351,22 +347,15 @@ def test_a_dart_with_room_is_cut_away_and_notched_where_its_allowances_are_apart
 
 @pytest.mark.parametrize(("cut", "said"), [(True, "seam 0.6/1 cm"), (False, "seam 0.6 cm")])
 def test_the_label_tells_the_allowances_of_a_dart_that_is_cut_away(cut, said):
-    corners = np.array([(0, 0), (0.1, 0), (0.15, 0.1), (0.2, 0), (0.3, 0), (0.3, 0.3), (0, 0.3), (0, 0)], dtype=float)
-    edges = [
-        Edge(name=f"e{i}", points=corners[i : i + 2], kind="dart" if i in (1, 2) else "seam", allowance=width)
-        for i, width in enumerate((0.006, None, 0.01, 0.006, 0.006, 0.006, 0.006))
-    ]
-    piece = draft_piece(Piece(name="p", edges=edges, darts=[Dart(name="d", left="e1", right="e2", cut=cut)]))
+    widths = (0.006, None, 0.01, 0.006, 0.006, 0.006, 0.006)
+    darts = [Dart(name="d", left="e1", right="e2", cut=cut)]
+    piece = draft_piece(polygon("p", DARTED, kinds=KINDS, widths=widths, darts=darts))
     assert f"Includes {said}" in [text for text, _ in piece.label.lines]
 
 
 def test_legs_of_different_length_are_noted():
-    corners = np.array(
-        [(0, 0), (0.1, 0), (0.12, 0.15), (0.14, 0.004), (0.3, 0), (0.3, 0.3), (0, 0.3), (0, 0)], dtype=float
-    )
-    kinds = ("seam", "dart", "dart", "seam", "seam", "seam", "seam")
-    edges = [Edge(name=f"e{i}", points=corners[i : i + 2], kind=k) for i, k in enumerate(kinds)]
-    piece = draft_piece(Piece(name="p", edges=edges, darts=[Dart(name="d", left="e1", right="e2")]))
+    corners = [(0, 0), (0.1, 0), (0.12, 0.15), (0.14, 0.004), (0.3, 0), (0.3, 0.3), (0, 0.3)]
+    piece = draft_piece(polygon("p", corners, kinds=KINDS, darts=[Dart(name="d", left="e1", right="e2")]))
     assert any("legs differ by 3.9 mm" in note or "legs differ by 4.0 mm" in note for note in piece.notes)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
+from polygons import corners_of, polygon, sides
 
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.pattern.drafting.curves import chords, fit_curve
@@ -34,7 +35,7 @@ def dart_with(left: np.ndarray, right: np.ndarray) -> Piece:
     left, right = (left + tip)[::-1], right + tip
     corners = np.array([right[-1], (0.5, right[-1, 1]), (0.5, 0.5), (-0.1, 0.5), (-0.1, left[0, 1]), left[0]])
     edges = [Edge(name="l", points=left, kind="dart"), Edge(name="r", points=right, kind="dart")]
-    edges += [Edge(name=f"e{i}", points=corners[i : i + 2]) for i in range(5)]
+    edges += sides(corners, closed=False)
     return Piece(name="p", edges=edges, darts=[Dart(name="d", left="l", right="r", cut=True)])
 
 
@@ -92,10 +93,8 @@ def test_a_clean_line_inside_stays_as_it_is(line: np.ndarray):
 
 
 def test_lines_are_smoothed_on_the_pattern_only_and_not_where_a_tolerance_is_asked_for():
-    square = np.array([(0.0, 0.0), (0.4, 0.0), (0.4, 0.4), (0.0, 0.4), (0.0, 0.0)])
-    edges = [Edge(name=f"e{i}", points=square[i : i + 2]) for i in range(4)]
     line = teeth(41, 0.005) + np.array([0.2, 0.3])
-    piece = Piece(name="p", edges=edges, internal_lines={"level": line})
+    piece = polygon("p", corners_of(0.4, 0.4), internal_lines={"level": line})
     drafted = draft_piece(piece)
     assert is_wavy(chords(piece.internal_lines["level"]))
     assert not is_wavy(chords(drafted.internal_lines["level"]))

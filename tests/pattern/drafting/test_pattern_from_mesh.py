@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import shapely
 from shapely.affinity import scale
+from surface_meshes import quads_between
 
 from warpflat.core.errors import InputError
 from warpflat.core.left_out import LeftOut, listening_to_left_out
@@ -17,7 +18,7 @@ from warpflat.pattern.drafting.from_mesh import MeshFeatures, piece_from_mesh
 def grid(columns=10, rows=12, width=0.2, height=0.3):
     x, y = np.meshgrid(np.linspace(0, width, columns + 1), np.linspace(0, height, rows + 1))
     index = np.arange((columns + 1) * (rows + 1)).reshape(rows + 1, columns + 1)
-    faces = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
+    faces = quads_between(index)
     lines = {"hem": index[0], "side": index[:, -1], "centre": index[:, 0], "level": index[6]}
     return faces.astype(np.int32), np.column_stack([x.ravel(), y.ravel()]), lines, index
 

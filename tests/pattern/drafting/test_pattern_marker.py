@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+from polygons import corners_of, polygon
 from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.layout import covered_rings, lay_out, nests
 from warpflat.pattern.drafting.marker import Cloth, cloth_needed, make_marker, unfold_piece
-from warpflat.pattern.drafting.piece_parts import Edge, Hole
+from warpflat.pattern.drafting.piece_parts import Hole
 from warpflat.pattern.drafting.pieces import Pattern, Piece
 from warpflat.pattern.export.svg import write_marker_svg
 
@@ -69,12 +70,10 @@ def test_utilisation_is_area_over_cloth(marker):
 
 def frame(name, width, height, rim, *, fold=False):
     """A piece with a hole `rim` [m] from its border."""
-    corners = np.array([(0, 0), (width, 0), (width, height), (0, height), (0, 0)])
-    edges = [Edge(name=f"e{i}", points=corners[i : i + 2]) for i in range(4)]
-    if fold:
-        edges[3] = Edge(name="fold", points=corners[3:], kind="fold")
-    hole = np.array([(rim, rim), (width - rim, rim), (width - rim, height - rim), (rim, height - rim)])
-    return Piece(name=name, edges=edges, holes=[Hole(name="hole", points=hole, allowance=0.0)])
+    hole = np.array(corners_of(width - 2 * rim, height - 2 * rim, rim, rim))
+    kinds = ("seam", "seam", "seam", "fold" if fold else "seam")
+    holes = [Hole(name="hole", points=hole, allowance=0.0)]
+    return polygon(name, corners_of(width, height), kinds=kinds, holes=holes)
 
 
 @pytest.mark.parametrize("fold", [False, True])
@@ -148,18 +147,9 @@ def test_a_size_that_lies_within_a_larger_one_needs_no_more_cloth(
     monkeypatch: pytest.MonkeyPatch, width: float, length: float, needed: float
 ):
     """The lay of a size is searched for by itself, and that of a larger one may turn out shorter."""
-    corners = np.array([[0.0, 0.0], [0.5, 0.0], [0.4, 0.8], [0.1, 0.8], [0.0, 0.0]])
+    corners = np.array([[0.0, 0.0], [0.5, 0.0], [0.4, 0.8], [0.1, 0.8]])
     sizes = {"38": np.array([1.0, 1.0]), "42": np.array([width, length])}
-    pieces = {
-        size: [
-            Piece(
-                name="front",
-                size=size,
-                edges=[Edge(name=f"edge_{k}", points=grown * corners[k : k + 2], kind="seam") for k in range(4)],
-            )
-        ]
-        for size, grown in sizes.items()
-    }
+    pieces = {size: [polygon("front", grown * corners, size=size)] for size, grown in sizes.items()}
     found = iter([1.25, 1.25, None, 1.20, 1.20, 1.30])
     monkeypatch.setattr("warpflat.pattern.drafting.marker.nest_on_strip", lambda *_, **__: next(found))
     cloth = cloth_needed(draft_garment(Pattern(name="dress", pieces=pieces)))

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from warpflat.core.errors import InputError
-from warpflat.garment.construction.finishing import Finishing, finish_edges
+from warpflat.garment.construction.details import FinishingTable
+from warpflat.garment.construction.finishing import finish_edges
 from warpflat.garment.construction.linings import add_interfacing, add_lining
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.piece_parts import Edge
@@ -68,8 +69,8 @@ ZIP = SeamOpening(kind="zip", length=0.3, style="invisible")
 
 def test_zip_is_sewn_in_first_and_everything_inside_ends_at_it():
     facing, binding = (
-        Finishing(kind="facing", edge="neck", width=0.05),
-        Finishing(kind="binding", edge="armhole", width=0.035),
+        FinishingTable(kind="facing", edge="neck", width_mm=50),
+        FinishingTable(kind="binding", edge="armhole", width_mm=35),
     )
     pattern = finish_edges(top(ZIP), [facing, binding], gaps=["centre back"])
     drafted = draft_garment(add_lining(add_interfacing(pattern, "interfacing"), "lining"))
@@ -155,7 +156,7 @@ def test_a_zip_above_a_vent_is_closed_down_to_the_vent():
 
 
 def test_a_band_that_is_shorter_than_its_edge_is_stretched():
-    band = Finishing(kind="band", edge="neck", width=0.02, share=0.85)
+    band = FinishingTable(kind="band", edge="neck", width_mm=20, share=0.85)
     (step,) = [
         step.words
         for step in sewing_steps(draft_garment(finish_edges(top(), [band])), "")
@@ -165,7 +166,7 @@ def test_a_band_that_is_shorter_than_its_edge_is_stretched():
 
 
 def test_nothing_ends_at_a_zip_that_is_not_there():
-    facing = Finishing(kind="facing", edge="neck", width=0.05)
+    facing = FinishingTable(kind="facing", edge="neck", width_mm=50)
     pattern = finish_edges(top(SeamOpening(kind="buttons", length=0.2)), [facing], gaps=["centre back"])
     assert not any("zip" in step.words for step in sewing_steps(draft_garment(pattern), ""))
 
@@ -224,22 +225,26 @@ def test_pocket_and_straps_that_no_seam_takes_are_sewn_on():
 
 
 def test_a_waistband_above_a_zip_has_a_hook():
-    band = Finishing(kind="waistband", edge="neck", width=0.03)
+    band = FinishingTable(kind="waistband", edge="neck", width_mm=30)
     zipped = draft_garment(finish_edges(top(ZIP), [band], gaps=["centre back"]))
     assert "1 hook and bar" in notions(sewing_steps(zipped, ""))
     assert "1 hook and bar" not in notions(sewing_steps(draft_garment(finish_edges(top(), [band])), ""))
 
 
 @pytest.mark.parametrize(
-    ("kind", "share", "expected"),
+    ("kind", "more", "expected"),
     [
-        ("band", 0.85, "Fold the bands lengthwise, wrong sides together, and sew both their edges on, notch to notch"),
-        ("binding", 1.0, "Sew the bindings on, right sides together, notch to notch: "),
-        ("ruffle", 1.5, "Sew the ruffles on, right sides together, notch to notch: "),
+        (
+            "band",
+            {"share": 0.85},
+            "Fold the bands lengthwise, wrong sides together, and sew both their edges on, notch to notch",
+        ),
+        ("binding", {}, "Sew the bindings on, right sides together, notch to notch: "),
+        ("ruffle", {"share": 1.5}, "Sew the ruffles on, right sides together, notch to notch: "),
     ],
 )
-def test_each_strip_is_sewn_on_as_its_kind_is(kind: str, share: float, expected: str):
-    finishing = Finishing(kind=kind, edge="neck", width=0.03, share=share)
+def test_each_strip_is_sewn_on_as_its_kind_is(kind: str, more: dict[str, float], expected: str):
+    finishing = FinishingTable(kind=kind, edge="neck", width_mm=30, **more)
     drafted = draft_garment(finish_edges(top(), [finishing]))
     steps = [step.words for step in sewing_steps(drafted, "")]
     assert sum(step.startswith(expected) for step in steps) == 1
@@ -248,7 +253,7 @@ def test_each_strip_is_sewn_on_as_its_kind_is(kind: str, share: float, expected:
 
 
 def test_a_waistband_has_ends_only_above_an_opening():
-    band = Finishing(kind="waistband", edge="neck", width=0.03)
+    band = FinishingTable(kind="waistband", edge="neck", width_mm=30)
     for openings, gaps, ends in (((ZIP,), ["centre back"], True), ((), [], False)):
         steps = sewing_steps(draft_garment(finish_edges(top(*openings), [band], gaps=gaps)), "")
         (step,) = [step.words for step in steps if step.words.startswith("Sew the waistband on, ")]

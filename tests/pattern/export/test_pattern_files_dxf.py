@@ -12,6 +12,7 @@ from xml.etree import ElementTree as ET
 import ezdxf
 import numpy as np
 import pytest
+from polygons import sides
 from sample_dress import sample_dress
 from scipy.spatial import KDTree
 from shapely.geometry import LinearRing, Point
@@ -164,8 +165,7 @@ def test_inches(dress, tmp_path):
 
 
 def test_names_in_any_script_give_ascii_blocks_that_differ(tmp_path):
-    corners = np.array([(0, 0), (0.1, 0), (0.1, 0.1), (0, 0)])
-    edges = [Edge(name=f"é{i}", points=corners[i : i + 2]) for i in range(3)]
+    edges = sides([(0, 0), (0.1, 0), (0.1, 0.1)], names=("é0", "é1", "é2"))
     names = ("Rückenteil links", "Ruckenteil links", "前身頃", "後身頃")
     pieces = [Piece(name=n, edges=edges) for n in names]
     write_dxf(draft_garment(Pattern(name="x", pieces={"": pieces})), tmp_path / "p.dxf")
@@ -174,8 +174,7 @@ def test_names_in_any_script_give_ascii_blocks_that_differ(tmp_path):
 
 
 def test_pieces_that_ascii_cannot_name_go_by_their_number_in_every_size(tmp_path):
-    corners = np.array([(0, 0), (0.1, 0), (0.1, 0.1), (0, 0)])
-    edges = [Edge(name=f"{i}", points=corners[i : i + 2]) for i in range(3)]
+    edges = sides([(0, 0), (0.1, 0), (0.1, 0.1)], names="012")
     sizes = {s: [Piece(name=n, edges=edges, size=s) for n in ("前身頃", "front", "後身頃")] for s in ("EU 36", "EU 38")}
     write_dxf(draft_garment(Pattern(name="x", pieces=sizes)), tmp_path / "p.dxf")
     document = ezdxf.readfile(tmp_path / "p.dxf")

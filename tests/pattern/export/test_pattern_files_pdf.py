@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 import shapely
 from PIL import Image
+from polygons import corners_of, polygon
 from pypdf import PdfReader
 
 from warpflat.core.errors import InputError
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.half_pieces import halved
-from warpflat.pattern.drafting.piece_parts import Edge
-from warpflat.pattern.drafting.pieces import Pattern, Piece
+from warpflat.pattern.drafting.pieces import Pattern
 from warpflat.pattern.export.pdf import PAPERS, draw_sheet, write_pdf
 from warpflat.pattern.export.pdf_legend import TEST_INCHES, TEST_MM
 from warpflat.pattern.export.pdf_tiling import LEGEND_SIZE
@@ -204,12 +204,8 @@ def test_the_same_pattern_gives_the_same_bytes(dress, tmp_path):
 @pytest.mark.skipif(shutil.which("pdftotext") is None, reason="pdftotext (poppler) is not installed")
 def test_names_on_the_first_page_stay_on_it_and_on_their_pieces(tmp_path):
     """By the boxes of words that poppler finds: what has no room in the overview is a number of the list above it."""
-    corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)])
     shapes = {"tab_of_the_left_front": (0.01, 0.01), "front": (0.3, 0.6), "waistband_facing": (0.5, 0.05)}
-    pieces = [
-        Piece(name=name, edges=[Edge(name=f"e{i}", points=corners[i : i + 2] * size) for i in range(4)])
-        for name, size in shapes.items()
-    ]
+    pieces = [polygon(name, corners_of(*size)) for name, size in shapes.items()]
     name = "a_garment_with_a_name_that_is_far_too_long_for_the_width_of_the_page"
     write_pdf(draft_garment(Pattern(name=name, pieces={"": pieces})), tmp_path / "p.pdf")
     told = subprocess.run(

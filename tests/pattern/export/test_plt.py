@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 import shapely
 from command import Command
+from polygons import sewn, sides
 
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.layout import lay_out, nests
 from warpflat.pattern.drafting.piece_parts import Dart, Edge, Hole
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern.drafting.pieces import Pattern, Piece
 from warpflat.pattern.export.pattern_json import write_pattern_json
 from warpflat.pattern.export.plt import write_plt
 
@@ -58,21 +59,17 @@ def garment(sizes: tuple[str, ...] = ("",)) -> DraftedGarment:
     pieces = {}
     for number, size in enumerate(sizes):
         wide = 0.4 + 0.01 * number
-        ring = np.array(
-            [(0.0, 0.0), (wide, 0.0), (wide, 0.3), (0.22, 0.3), (0.2, 0.15), (0.18, 0.3), (0.0, 0.3), (0.0, 0.0)]
-        )
-        kinds = ["hem", "seam", "seam", "dart", "dart", "seam", "seam"]
-        edges = [Edge(name=f"e{k + 1}", points=ring[k : k + 2], kind=kind) for k, kind in enumerate(kinds)]
+        corners = [(0.0, 0.0), (wide, 0.0), (wide, 0.3), (0.22, 0.3), (0.2, 0.15), (0.18, 0.3), (0.0, 0.3)]
+        edges = sides(corners, kinds=["hem", "seam", "seam", "dart", "dart", "seam", "seam"], first=1)
         turn = np.linspace(0.0, np.pi, 61)
         arc = np.column_stack([wide / 2 - wide / 2 * np.cos(turn), -0.05 * np.sin(turn)])
-        arc[[0, -1]] = ring[:2]
+        arc[[0, -1]] = corners[:2]
         edges[0] = Edge(name="e1", points=arc, kind="hem")
         hole = Hole(name="eye", points=np.array([(0.05, 0.05), (0.1, 0.05), (0.1, 0.1), (0.05, 0.1)]), allowance=0.0)
         pieces[size] = [
             Piece(name="Ärmel", size=size, edges=edges, holes=[hole], darts=[Dart(name="bust", left="e4", right="e5")])
         ]
-    sides = (SeamSide(piece="Ärmel", edge="e2"),), (SeamSide(piece="Ärmel", edge="e7", reversed=True),)
-    return draft_garment(Pattern(name="p", pieces=pieces, seams=[Seam(name="side", sides=sides)]))
+    return draft_garment(Pattern(name="p", pieces=pieces, seams=[sewn("Ärmel.e2", "Ärmel.e7", "side")]))
 
 
 def test_what_a_plotter_draws_is_the_pattern(tmp_path: Path):

@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from warpflat.app.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, ComputingCommand, tell
+from warpflat.app.cli.options import DONE, EXIT_CODES, FAULTY, ComputingCommand, tell
 
 __all__ = ["batch"]
 
@@ -84,7 +84,7 @@ def batch(file: Path, out: Path | None, workers: int, scheduler: str | None, qui
     if not quiet:
         totals = ", ".join(f"{count} {status}" for status, count in counts.items())
         click.echo(f"{len(rows)} tasks: {totals}; see {folder / 'index.html'}")
-    return NOT_CONVERGED if failed or NOT_AT_REST in counts else DONE
+    return FAULTY if failed or NOT_AT_REST in counts else DONE
 
 
 class _Bar:

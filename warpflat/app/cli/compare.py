@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from warpflat.app.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, ComputingCommand, Output, output_options, tell
+from warpflat.app.cli.options import DONE, EXIT_CODES, FAULTY, ComputingCommand, Output, output_options, tell
 from warpflat.app.cli.run import start_warp_silently
 
 __all__ = ["compare"]
@@ -69,4 +69,4 @@ def compare(scene: Path, fabrics: tuple[str, ...], drape: bool, output: Output) 
     for warning in warnings:
         tell(warning)
     output.report(folder / "compare.json", lambda: [comparison_table(comparison), f"{folder}: {', '.join(files)}"])
-    return NOT_CONVERGED if warnings else DONE
+    return FAULTY if warnings else DONE

@@ -8,7 +8,7 @@ from typing import Literal
 
 import click
 
-from warpflat.app.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, ComputingCommand, Output, output_options, tell
+from warpflat.app.cli.options import DONE, EXIT_CODES, FAULTY, ComputingCommand, Output, output_options, tell
 from warpflat.app.cli.run import report_run, start_warp_silently
 from warpflat.core import InputError
 
@@ -86,7 +86,7 @@ def cuts(
         output.report(
             folder / "edit.json", lambda: [f"{edit_table(data)}\n\n{made.as_toml()}\n{folder}: edit.json, cuts.toml"]
         )
-        return DONE if data["after"]["converged"] else NOT_CONVERGED
+        return DONE if data["after"]["converged"] else FAULTY
     if at is not None:
         raise InputError("--at belongs to --rotate and --split")
     from warpflat.app.cli.progress_bar import ProgressBar

@@ -9,7 +9,7 @@ import click
 from warpflat.app.cli.options import (
     DONE,
     EXIT_CODES,
-    NOT_CONVERGED,
+    FAULTY,
     RUN_FILES,
     ComputingCommand,
     Output,
@@ -110,7 +110,7 @@ def drape(
                 *(drape_lines(result.metrics) if output.verbose else ()),
             ],
         )
-        return NOT_CONVERGED if warnings else DONE
+        return FAULTY if warnings else DONE
     of_pattern = {"units": units, "body": body, "fabric": fabric, "seams": seams, "size": size, "edges": edges or None}
     for option, value in of_pattern.items():
         if value is not None:

@@ -27,7 +27,7 @@ from warpflat.app.cli.internal_error import report_internal_error
 from warpflat.app.cli.mannequin import mannequin
 from warpflat.app.cli.marker import marker
 from warpflat.app.cli.new import new
-from warpflat.app.cli.options import BAD_INPUT, DONE, EXIT_CODES, NOT_CONVERGED
+from warpflat.app.cli.options import BAD_INPUT, DONE, EXIT_CODES, FAULTY
 from warpflat.app.cli.review import review
 from warpflat.app.cli.run import run
 from warpflat.app.cli.signals import INTERRUPTED, Stopped, signal_message, stop_on_signals
@@ -64,7 +64,7 @@ class _Group(click.Group):
             where = "" if step.folder is None else f"{step.folder}: "
             head = "" if step.is_needed else f"note: {where}"
             click.echo(one_line(f"warpflat: {head}{step.note}"), err=True)
-        return code or (NOT_CONVERGED if any(step.is_needed for step in left_out) else DONE)
+        return code or (FAULTY if any(step.is_needed for step in left_out) else DONE)
 
 
 @click.group(
@@ -166,7 +166,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             message = f"cannot write to standard output: {reason}"
             if len(written_folders()) > written:
                 click.echo(f"warpflat: {message}; the files are written", err=True)
-                return NOT_CONVERGED
+                return FAULTY
             return _fail(message)
         return _fail(f"cannot read or write {error.filename or 'a temporary file'}: {reason}")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from warpflat.app.cli.options import DONE, NOT_CONVERGED, ComputingCommand, tell
+from warpflat.app.cli.options import DONE, FAULTY, ComputingCommand, tell
 
 __all__ = ["marker"]
 
@@ -145,4 +145,4 @@ def marker(
         for note in notes:
             tell(note)
         click.echo(f"{files[0].parent}: {', '.join(file.name for file in files)}")
-    return NOT_CONVERGED if any("not_made" in plan for plan in plans) else DONE
+    return FAULTY if any("not_made" in plan for plan in plans) else DONE

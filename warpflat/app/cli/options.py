@@ -18,7 +18,7 @@ __all__ = [
     "BAD_INPUT",
     "DONE",
     "EXIT_CODES",
-    "NOT_CONVERGED",
+    "FAULTY",
     "RUN_FILES",
     "ComputingCommand",
     "Output",
@@ -29,12 +29,12 @@ __all__ = [
 ]
 
 
-DONE, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
+DONE, FAULTY, BAD_INPUT = 0, 1, 2
 
 EXIT_CODES = """\b
 Exit codes:
   0    done
-  1    done, but a piece did not converge, has flipped faces or lies over itself, in whatever size, the
+  1    done, but it is no pattern yet: a piece did not converge, has flipped faces or lies over itself, in whatever size, the
        sides of a drawn seam differ, or a step that the pattern needs had to be left out
   2    bad input; one line says what is wrong, where, and what would be right
   70   an internal error, which is the program's own fault; WARPFLAT_TRACEBACK=1 prints its traceback

@@ -14,7 +14,7 @@ import click
 from warpflat.app.cli.options import (
     DONE,
     EXIT_CODES,
-    NOT_CONVERGED,
+    FAULTY,
     RUN_FILES,
     ComputingCommand,
     Output,
@@ -116,4 +116,4 @@ def report_run(result: SceneResult, folder: Path, output: Output) -> int:
         return summary_lines(metrics, files, str(folder), size=result.size, width=width)
 
     output.report(folder / "metrics.json", words)
-    return NOT_CONVERGED if warnings else DONE
+    return FAULTY if warnings else DONE

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from warpflat.app.scene.load import Scene, errors_named, make_scene
@@ -250,20 +250,9 @@ def place_of(cut: Mapping[str, Any]) -> tuple[str | None, ...]:
 
 
 def _dart(table: CutTable) -> FormDart:
-    return FormDart(
-        name=table.name or f"{table.line}".removesuffix(" left").removesuffix(" right"),
-        piece=table.piece or "",
-        line=table.line or "",
-        at=table.at,
-        towards=table.towards,
-        between=table.between,
-        part=None if table.part is None else (table.part[0], table.part[1]),
-        tip_mm=table.tip_mm,
-        mirrored=table.mirrored,
-        mouth_mm=table.mouth_mm,
-        like=table.like,
-        pleat_mm=table.pleat_mm,
-    )
+    keys: dict[str, Any] = {field.name: getattr(table, field.name) for field in fields(FormDart)}
+    keys["name"] = table.name or f"{table.line}".removesuffix(" left").removesuffix(" right")
+    return FormDart(**keys | {"part": table.part and (table.part[0], table.part[1])})
 
 
 def omitted(dart: FormDart, **more: str) -> dict[str, Any]:
@@ -279,17 +268,9 @@ def asked_cuts(scene: Scene) -> list[dict[str, Any]]:
 
 def cut_of_dart(dart: FormDart) -> dict[str, Any]:
     """Return the table of `[[cuts]]` that asks for a dart; what is the default anyway is left out."""
-    keys: dict[str, Any] = {"name": dart.name, "piece": dart.piece, "line": dart.line}
-    for key in ("at", "towards", "tip_mm", "mouth_mm", "like", "pleat_mm"):
-        if getattr(dart, key) is not None:
-            keys[key] = getattr(dart, key)
-    if dart.towards is not None:
-        keys["between"] = dart.between
-    if dart.part is not None:
-        keys["part"] = list(dart.part)
-    if not dart.mirrored:
-        keys["mirrored"] = False
-    return keys
+    usual = {"mirrored": True} | ({"between": dart.between} if dart.towards is None else {})
+    keys = {key: value for key, value in asdict(dart).items() if value is not None and value != usual.get(key)}
+    return keys if dart.part is None else {**keys, "part": list(dart.part)}
 
 
 def scene_with(scene: Scene, **tables: Any) -> Scene:

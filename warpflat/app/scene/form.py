@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from warpflat.app.scene.cuts import cut_form
-from warpflat.app.scene.load import Scene, errors_named, expand_variables, scene_fabric
-from warpflat.app.scene.openings import scene_finishing, scene_openings
+from warpflat.app.scene.load import Scene, errors_named, scene_fabric
 from warpflat.app.scene.pulled_on import wide_enough
 from warpflat.garment import (
     Form,
@@ -45,8 +44,8 @@ def scene_form(
                 mannequin,
                 built,
                 strain_limit=scene_fabric(scene).strain_limit,
-                openings=scene_openings(scene.settings),
-                finishing=scene_finishing(scene.settings.finishing),
+                openings=scene.settings.openings,
+                finishing=scene.settings.finishing,
             )
     return mannequin, built
 
@@ -61,7 +60,7 @@ def scene_mannequin(scene: Scene, *, size: str | None = None) -> Mannequin:
     assert table is not None  # the schema sees to it
     table = table if size is None else table.model_copy(update={"size": size})
     with errors_named(f"{scene.where}: {'mannequin' if size is None else 'pattern.sizes'}"):
-        return mannequin_from_table(table, path_of=lambda file: scene.folder / expand_variables(file))
+        return mannequin_from_table(table, path_of=scene.path)
 
 
 def scene_recipe(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mannequin, Form]:
@@ -80,7 +79,7 @@ def scene_recipe(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mann
         form = replace(form, ease=ease_from(settings.ease, scene.where, base=form.ease))
     with errors_named(f"{scene.where}: form"):
         if not settings.half:
-            form = part_at_centres(mannequin.layout, form, scene_openings(settings))
+            form = part_at_centres(mannequin.layout, form, settings.openings)
         shape = "darts" if settings.shape == "auto" else settings.shape
         woven = not scene_fabric(scene).is_knit
         form = shaped_form(mannequin.layout, form, shape, mannequin.vertices, woven=woven)

@@ -88,9 +88,7 @@ def _cut(
             entry
             for name in wanting
             for entry in known[name]
-            if entry.can_be_sewn
-            and entry.released > 0.0
-            and (not usual_only or entry.outside_after < entry.outside_before)
+            if entry.helps and (not usual_only or entry.outside_after < entry.outside_before)
         ]
         if not helpful:
             break

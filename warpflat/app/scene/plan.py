@@ -12,8 +12,14 @@ from warpflat.app.scene.cuts import CutSequence, cut_of_dart, plan_automatic_cut
 from warpflat.app.scene.form import scene_form, scene_mannequin
 from warpflat.app.scene.found_seams import found_seams, plain_panel, seams_entry
 from warpflat.app.scene.frames import FrameRecorder
-from warpflat.app.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
-from warpflat.app.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands
+from warpflat.app.scene.load import (
+    Scene,
+    errors_named,
+    fabric_of_correction,
+    scene_fabric,
+    scene_relax_options,
+    scene_wear,
+)
 from warpflat.app.scene.pattern_options import pattern_options
 from warpflat.app.scene.schema import PieceTable
 from warpflat.app.scene.seams import scene_constraints, scene_surface_seams, scene_wishes
@@ -35,14 +41,14 @@ from warpflat.flat import (
 from warpflat.garment import (
     CURVES_MM,
     GRAIN,
-    BorderSeam,
     Constraint,
     FormGarment,
     FormResult,
     FoundSeams,
     Garment,
     Mannequin,
-    Opening,
+    OpeningTable,
+    SeamTable,
     SeamWish,
     SewnPanel,
     cap_wishes,
@@ -58,7 +64,9 @@ from warpflat.garment import (
     seam_words,
     select_bricks,
     sew_pieces,
+    sewn_centres,
     sized_opening,
+    straight_stands,
     unsewn_notes,
 )
 from warpflat.pattern import PatternOptions, check_names
@@ -172,7 +180,7 @@ class MeshPlan(Plan):
     """
 
     sequences: Sequence[CutSequence]
-    seams: Sequence[BorderSeam] = ()
+    seams: Sequence[SeamTable] = ()
     panels: Sequence[SewnPanel] = ()
 
     @property
@@ -281,7 +289,7 @@ class GarmentPlan(Plan):
     form: FormResult
     wishes: Sequence[SeamWish]
     constraints: Sequence[Constraint]
-    openings: Sequence[Opening]
+    openings: Sequence[OpeningTable]
     settings: Mapping[str, Any]
 
     @property
@@ -312,8 +320,6 @@ class GarmentPlan(Plan):
                 garment = flattened()
             if unsewn:
                 garment = flattened(sewn=False)
-            finishing = scene_finishing(self.scene.settings.finishing)
-            pockets = scene_pockets(self.scene.settings.pockets)
         for name, recorder in (recorders or {}).items():
             piece = garment.pieces[name]
             for layout in (piece.unsewn, piece):
@@ -322,8 +328,8 @@ class GarmentPlan(Plan):
         return replace(
             garment,
             openings=tuple(self.openings),
-            finishing=finishing,
-            pockets=pockets,
+            finishing=self.scene.settings.finishing,
+            pockets=self.scene.settings.pockets,
             remarks=(*unsewn, *garment.remarks),
         )
 
@@ -395,6 +401,7 @@ def plan_scene(
     Raises:
         InputError: the source, a line, a cut, the fabric, a seam or a setting is wrong.
     """
+    fabric_of_correction(scene)  # a mistake is reported before anything is made
     if scene.settings.mannequin is None:
         return plan_mesh(scene, device=device, cuts=cuts)
     return plan_garment(scene, device=device, built=built)
@@ -502,7 +509,7 @@ def flatten_surface(
         from warpflat.app.scene.read_layout import read_layout
 
         with errors_named(f"{scene.where}: start"):
-            start = read_layout(scene.folder / expand_variables(settings.start))
+            start = read_layout(scene.path(settings.start))
     options = {**flatten_options(scene, device), "relax": relax}
     return flatten(surface, datum=settings.datum, start=start, callback=callback, **options)
 
@@ -541,7 +548,10 @@ def plan_garment(
     mannequin, form = built or scene_form(scene)
     with errors_named(f"{scene.where}: pattern"):
         drawing = pattern_options(settings.pattern, settings.marker, settings.cloth)
-        openings = scene_openings(settings)
+        openings = list(settings.openings)
+        if settings.cloth is not None and settings.cloth.lining:
+            # A lining is sewn to the inner edges of the facings of button stands.
+            openings = [each.model_copy(update={"facing": each.facing or "separate"}) for each in openings]
         if settings.half:
             drawing = replace(drawing, rules=sewn_centres(drawing.rules, openings))
         plan = plan_form(form, drawing.rules)

@@ -8,11 +8,11 @@ from dataclasses import replace
 
 from warpflat.core import InputError
 from warpflat.garment import (
-    Finishing,
+    FinishingTable,
     FormResult,
     Mannequin,
     Neckline,
-    Opening,
+    OpeningTable,
     measure_rings,
     opened_rings,
     sized_opening,
@@ -32,8 +32,8 @@ def wide_enough(
     form: FormResult,
     *,
     strain_limit: float,
-    openings: Sequence[Opening],
-    finishing: Sequence[Finishing],
+    openings: Sequence[OpeningTable],
+    finishing: Sequence[FinishingTable],
 ) -> FormResult:
     """Return a form whose rings pass over what they must at the cloth's limit, with notes on what has grown for that.
 

@@ -19,10 +19,10 @@ from warpflat.flat.cutting.crack import Price
 from warpflat.flat.cutting.cut_piece import cut
 from warpflat.flat.cutting.cut_plan import CutPlan
 from warpflat.flat.cutting.refine_piece import refine_along
+from warpflat.flat.flattening.applied_cut import measure_crack
 from warpflat.flat.flattening.edit import relax_cut
 from warpflat.flat.flattening.result import Flattening
 from warpflat.flat.solver.options import RelaxOptions, coarse_options
-from warpflat.flat.surface.cut.dart import dart_measure, fish_eye_measure
 
 __all__ = [
     "LEAST_MOUTH",
@@ -108,21 +108,15 @@ class LedgerEntry:
             name: of the cut.
             before, after: the pieces that it changes, and what has become of them.
             paths: see the attributes.
-            cracks: each the piece in which it lies and the vertices along its two sides, as :func:`dart_measure` takes them.
+            cracks: each the piece in which it lies and the vertices along its two sides.
             of_source: `candidate`, `result`, `cut`.
         """
         widest = math.nan, math.nan
         for piece, left, right in cracks:
-            first, last = left[0] == right[0], left[-1] == right[-1]
-            if first and last:
-                eye = fish_eye_measure(piece.positions, left, right)
-                crack = abs(eye.intake), min(eye.first_angle, eye.last_angle)
-            elif first or last:
-                dart = dart_measure(piece.positions, left, right)
-                crack = dart.opening, dart.angle
-            else:
-                crack = float(np.linalg.norm(piece.positions[left] - piece.positions[right], axis=1).max()), math.nan
-            widest = crack if math.isnan(widest[0]) or crack[0] > widest[0] else widest
+            found = measure_crack(piece.positions, left, right)
+            opening = found.get("widest_m", found["opening_m"])
+            if math.isnan(widest[0]) or opening > widest[0]:
+                widest = opening, math.radians(found.get("angle_deg", math.nan))
         old, new = ([piece.layout_measures for piece in pieces] for pieces in (before, after))
         return cls(
             name=name,
@@ -156,11 +150,6 @@ class LedgerEntry:
         return self.released / max(100.0 * self.length, np.finfo(float).tiny)
 
     @property
-    def overlaps(self) -> bool:
-        """True if the sides of the widest dart overlap, so that it could not be sewn."""
-        return self.angle < 0
-
-    @property
     def mouth(self) -> float | None:
         """How wide its widest dart opens [m], negative where the legs overlap; None of a seam."""
         return None if math.isnan(self.angle) else math.copysign(self.opening, self.angle)
@@ -169,6 +158,11 @@ class LedgerEntry:
     def can_be_sewn(self) -> bool:
         """Whether it opens by 5 mm or more, and leaves no flipped face."""
         return not self.flipped_faces and (self.mouth is None or self.mouth > LEAST_MOUTH)
+
+    @property
+    def helps(self) -> bool:
+        """Whether it can be sewn and releases energy."""
+        return self.can_be_sewn and self.released > 0.0
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data in SI units, but for `released_j_per_cm`."""
@@ -300,6 +294,7 @@ def make_ledger(
         InputError: there is nothing to cut for, or no candidate can be made.
     """
     words = peaks_in_words(result)
+    peak = f" ({words[0]})" if words else ""
     chosen = find_candidates(result) if candidates is None else candidates
     coarse = coarse_options(relax)
     cuts = [(one.name, one.price, one) for one in chosen]
@@ -307,7 +302,7 @@ def make_ledger(
     if not entries:
         why = (
             f"{refused[0][0]}: {refused[0][1]}" if refused
-            else f"none passes near the peak of its energy ({words[0]}), and no way of any length leads there or inwards from "
+            else f"none passes near the peak of its energy{peak}, and no way of any length leads there or inwards from "
             "the border; draw a line through it"
         )  # fmt: skip
         raise InputError(f"piece {result.surface.name!r} has no line to cut along: {why}")
@@ -377,7 +372,7 @@ def worn_strain_level(result: Flattening) -> float:
 def cut_automatically(
     result: Flattening, auto: AutoCut, *, relax: RelaxOptions | None = None
 ) -> tuple[Flattening, tuple[Ledger, ...]]:
-    """Cut greedily: try the candidates that promise most, make the best that does not overlap, and again until it is enough.
+    """Cut greedily: try the candidates that promise most, make the best that helps, and again until it is enough.
 
     Args:
         result: the flattened piece.
@@ -385,7 +380,7 @@ def cut_automatically(
         relax: options of the full relaxation, from which the coarse ones of the trials follow.
 
     Returns:
-        The piece as the last trial left it, and the ledger of each round.
+        The piece as the last trial left it, and the ledger of each round that made a cut.
     """
     ledgers: list[Ledger] = []
     while len(ledgers) < auto.max_cuts and not auto.is_enough(result):
@@ -397,8 +392,8 @@ def cut_automatically(
             if not ledgers:
                 raise
             break
-        best = next((entry for entry in ledger.entries if not entry.overlaps), None)
-        if best is None or best.result is None or best.released <= 0 or best.flipped_faces:
+        best = next((entry for entry in ledger.entries if entry.helps), None)
+        if best is None or best.result is None:
             break
         ledgers.append(ledger)
         result = best.result

@@ -52,8 +52,17 @@ def refine_along(result: Flattening, name: str, path: SurfacePath) -> tuple[Flat
             place += np.where(vertex >= 0, weight, 0.0)[:, None] * result.positions[result.faces[base, at]]
         positions[made.surface.faces[face, slot]] = place
     network = network_on_faces(result, made.surface, positions, drawn.face_origin)
+    weight = np.where(drawn.vertex_support >= 0, drawn.vertex_weights, 0.0)
+    developed = (weight[..., None] * result.development.positions[drawn.vertex_support]).sum(axis=1)
     refined = replace(
-        result, surface=surface, network=network, positions=positions, cuts=made.cuts, datum=through["\0datum"]
+        result,
+        surface=surface,
+        network=network,
+        development=replace(result.development, positions=developed),
+        positions=positions,
+        cuts=made.cuts,
+        datum=through["\0datum"],
+        close=None if result.close is None else result.close[drawn.face_origin],
     )
     return refined, drawn.path
 

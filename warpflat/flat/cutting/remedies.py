@@ -34,6 +34,8 @@ _PLACES, _KEPT = 4, 3
 _LEAST_CUT = 0.025
 # A cut helps that leaves no more than this share of what was beyond the limits.
 _HELPS = 0.9
+# How a note on a contact begins.
+_CONTACT_COSTS = "contact costs more than"
 
 
 def advise(result: Flattening) -> Flattening:
@@ -43,11 +45,14 @@ def advise(result: Flattening) -> Flattening:
     wearing was asked for, each of them is made and relaxed on trial, and those that help are kept. A note names the cut that would spare
     the piece a contact that costs much.
     """
+    notes = [note for note in result.notes if not note.startswith(_CONTACT_COSTS)]
     note = contact_note(result)
     if note is not None:
-        result = replace(result, notes=(*result.notes, note))
+        notes.append(note)
+    if tuple(notes) != result.notes:
+        result = replace(result, notes=tuple(notes))
     found = remedies(result, result.fit, trial=result.wear is not None)
-    return result.with_remedies(found) if found else result
+    return result.with_remedies(found) if found or result.remedies else result
 
 
 def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Remedy]:
@@ -58,7 +63,7 @@ def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Re
     Args:
         result: a flattened piece.
         fit: how it sits.
-        trial: make each cut, relax, and keep those that help, best first; else all of them, by what they promise for their length.
+        trial: make each cut, relax, and keep those that help, best first; else as many as are named, by what they promise for their length.
     """
     unsewn = result.unsewn or result
     if fit.within_limits or unsewn.fit.within_limits:
@@ -113,7 +118,7 @@ def contact_note(result: Flattening) -> str | None:
         )
     except InputError:
         opened = None  # The path meets a cut that was made before.
-    price = f"contact costs more than {100 * result.options.contact_share:.3g} % of the energy"
+    price = f"{_CONTACT_COSTS} {100 * result.options.contact_share:.3g} % of the energy"
     if (
         path is None
         or opened is None

@@ -18,7 +18,7 @@ from warpflat.flat.surface.cut.dart import dart_measure, fish_eye_measure, mouth
 from warpflat.flat.surface.cut.dart_legs import are_curved, pull_back
 from warpflat.flat.surface.mesh import Surface
 
-__all__ = ["AppliedCut", "cut_sides", "measure_cut", "seam_kind"]
+__all__ = ["AppliedCut", "cut_sides", "measure_crack", "measure_cut", "seam_kind"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,8 +48,42 @@ def cut_sides(cuts: Sequence[AppliedCut]) -> IntArray:
 
 def seam_kind(seam: Crack) -> str:
     """Return the kind of a seam: "dart" (one tip), "fish-eye" (two), or "parting" (none, from border to border or closed)."""
-    tips = int(seam.left[0] == seam.right[0]) + int(seam.left[-1] == seam.right[-1])
+    return _kind(seam.left, seam.right)
+
+
+def _kind(left: IntArray, right: IntArray) -> str:
+    tips = int(left[0] == right[0]) + int(left[-1] == right[-1])
     return ("parting", "dart", "fish-eye")[tips]
+
+
+def measure_crack(positions: FloatArray, left: IntArray, right: IntArray) -> dict[str, Any]:
+    """Measure how a crack opens: its kind, its widths [m], and of one with tips its angle [degrees], negative where its sides overlap.
+
+    Args:
+        positions: #P by 2, the pattern [m].
+        left, right: vertices along its two sides.
+    """
+    kind = _kind(left, right)
+    if kind == "dart":
+        dart = dart_measure(positions, left, right)
+        measures = {
+            "opening_m": dart.opening,
+            "angle_deg": math.degrees(dart.angle),
+            "intake_m": dart.intake,
+            "legs_m": [dart.left_leg, dart.right_leg],
+        }
+    elif kind == "fish-eye":
+        eye = fish_eye_measure(positions, left, right)
+        measures = {
+            "opening_m": abs(eye.intake),
+            "angle_deg": math.degrees(min(eye.first_angle, eye.last_angle)),
+            "intake_m": eye.intake,
+            "tip_to_tip_m": eye.length,
+        }
+    else:
+        gap = np.linalg.norm(positions[left] - positions[right], axis=1)
+        measures = {"opening_m": float(gap[[0, -1]].max()), "widest_m": float(gap.max())}
+    return {"kind": kind, **measures}
 
 
 def measure_cut(surface: Surface, positions: FloatArray, cut: AppliedCut) -> dict[str, Any]:
@@ -62,27 +96,8 @@ def measure_cut(surface: Surface, positions: FloatArray, cut: AppliedCut) -> dic
     """
     loops, seams = border_loops(surface.faces), []
     for seam in cut.seams:
-        kind = seam_kind(seam)
-        found: dict[str, Any] = {"kind": kind}
-        if kind == "dart":
-            dart = dart_measure(positions, seam.left, seam.right)
-            found |= {
-                "opening_m": dart.opening,
-                "angle_deg": math.degrees(dart.angle),
-                "intake_m": dart.intake,
-                "legs_m": [dart.left_leg, dart.right_leg],
-            }
-        elif kind == "fish-eye":
-            eye = fish_eye_measure(positions, seam.left, seam.right)
-            found |= {
-                "opening_m": abs(eye.intake),
-                "angle_deg": math.degrees(min(eye.first_angle, eye.last_angle)),
-                "intake_m": eye.intake,
-                "tip_to_tip_m": eye.length,
-            }
-        else:
-            gap = np.linalg.norm(positions[seam.left] - positions[seam.right], axis=1)
-            found |= {"opening_m": float(gap[[0, -1]].max()), "widest_m": float(gap.max())}
+        found = measure_crack(positions, seam.left, seam.right)
+        kind = found["kind"]
         for side, line in (("left", seam.left), ("right", seam.right)):
             found[f"{side}_seam_m"] = polyline_length(positions[line])
         if kind != "parting":

@@ -92,7 +92,6 @@ def change_surface(
     expect(result, Flattening, "result", "a Flattening, as flatten gives it")
     before, options = result.surface, given_options(relax)
     expect_callback(callback)
-    # The faces stay, and with them what has been found out about the mesh.
     # The surface with the moved vertices, checked to be the mesh before.
     given = surface
     if isinstance(given, Surface):
@@ -129,10 +128,9 @@ def change_surface(
         "has become a quad whose sides cross, or is folded by more than 90 degrees",
         "move its vertices along with those around them",
     )
+    # The faces stay, and with them what has been found out about the mesh.
     surface = replace(surface, faces=before.faces, of_faces=before.of_faces)
-    cut = result.network.surface
-    origin, used = np.empty(len(cut.vertices), dtype=np.int32), cut.faces >= 0
-    origin[cut.faces[used]] = before.faces[used]
+    cut, origin = result.network.surface, result.vertex_origin
     moved = surface
     if cut is not before:
         moved = replace(
@@ -237,6 +235,8 @@ def _continue(result: Flattening, task: RelaxationTask, positions: FloatArray) -
         positions=apart,
         stages=(*result.stages, *stages),
         history=np.concatenate([result.history.reshape(-1, 4), np.array(task.history).reshape(-1, 4)]),
+        # They were found for what it was.
+        remedies=(),
         notes=(*result.notes, *(note for note in task.notes if note not in result.notes)),
         options=task.options,
     )

@@ -39,7 +39,8 @@ def flatten_all(
 ) -> list[Flattening]:
     """Flatten several pieces, say all of a garment or one in ten sizes: the patterns that :func:`warpflat.flatten` gives of each.
 
-    All are developed before the first is relaxed, so that a piece that cannot be flattened is refused at once.
+    All are developed before the first is relaxed, so that a piece that cannot be flattened is refused at once. But a stretch
+    that one of them has no use for is a note here, as others may have.
 
     Args:
         surfaces: the pieces.

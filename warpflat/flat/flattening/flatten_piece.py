@@ -131,7 +131,7 @@ def check_settings(
     cloth = as_fabric(fabric)
     options = given_options(relax)
     if wear is not None:
-        expect(wear, Wear, "wear", "a Wear, of warpflat.flat.model.fit")
+        expect(wear, Wear, "wear", "a Wear")
     angle = np.asarray(grain_angle)
     if angle.ndim or angle.dtype.kind not in "iuf" or not np.isfinite(angle):
         raise InputError(f"grain_angle = {grain_angle!r} is not a number of degrees")

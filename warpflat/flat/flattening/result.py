@@ -105,7 +105,7 @@ class Flattening:
 
     @property
     def converged(self) -> bool:
-        """False if the relaxation ran into its step limit."""
+        """False if the relaxation ran into its step limit, or was stopped."""
         return self.stages[-1].converged
 
     @property

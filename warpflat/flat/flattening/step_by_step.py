@@ -29,7 +29,7 @@ class RelaxationStep:
     """The state after a step.
 
     Attributes:
-        step: steps so far; 0 is the development.
+        step: steps so far; 0 is the layout from which it starts.
         positions: #V by 2, the layout, read-only [m].
         model_energy_j: springs and guard, or membrane and guard; None where no energy was asked for [J].
         residual: largest force on a vertex over the mean spring force; None likewise.
@@ -65,7 +65,7 @@ def relaxation(
     energy_every: int = 1,
     force: Callable[[FloatArray], ArrayLike] | None = None,
 ) -> Iterator[RelaxationStep]:
-    """Iterate over the plain steps of a relaxation, from the development until it is at rest or the step limit is reached.
+    """Iterate over the plain steps of a relaxation, from where `flatten` would start until it is at rest or the step limit is reached.
 
     L-BFGS, repeated measuring of directions and contact are left to :func:`warpflat.flatten`, which is faster.
 
@@ -115,7 +115,7 @@ def _steps(
         state.hold_grain()
         measured = state.steps % energy_every == 0 or state.steps == options.max_steps
         if measured:
-            status = state.check_convergence(energy_every)
+            status = state.check_convergence(state.steps % energy_every or energy_every)
         yield _snapshot(state, measured=measured)
 
 

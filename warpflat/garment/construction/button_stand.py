@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpflat.core import FloatArray, InputError, arc_lengths, off_line, part_between, points_at_lengths, reflected
+from warpflat.garment.construction.details import OpeningTable
 from warpflat.garment.construction.edges import (
     backwards,
     beside,
@@ -21,7 +22,6 @@ from warpflat.garment.construction.edges import (
     with_edges,
 )
 from warpflat.garment.construction.facings import STAND, STAND_END
-from warpflat.garment.construction.openings import Buttons, Opening
 from warpflat.pattern import FOLD_STRAIGHT, Edge, Piece
 
 __all__ = ["bust_depth", "button_depths", "buttonhole", "with_button_stand", "with_wrap"]
@@ -37,32 +37,32 @@ _BAR = 0.004
 _WRAP_HEM, _LEAST_LEFT = 0.020, 0.020
 
 
-def button_depths(buttons: Buttons, length: float, bust: float | None, count: int | None = None) -> FloatArray:
+def button_depths(opening: OpeningTable, length: float, bust: float | None, count: int | None = None) -> FloatArray:
     """Return how far below the upper edge the buttons lie [m].
 
     Args:
-        buttons: what is wanted.
-        length: of the opening [m].
+        opening: with its buttons.
+        length: of it [m].
         bust: depth of the bust line, on which a button lies [m]; None where it crosses none.
         count: of another size, to which this one keeps.
 
     Raises:
         InputError: there is no room for two buttons.
     """
-    first, count = 0.5 * buttons.diameter + _BELOW, buttons.count or count
+    first, count = 0.5 * opening.button + _BELOW, opening.count or count
     if count is not None:
         spacing = (length - first) / max(count - 1 + _LEFT_BELOW, 1.0)
     else:
-        spacing = buttons.spacing
+        spacing = opening.spacing
         if bust is not None and bust - first > 0.5 * spacing:
             spacing = (bust - first) / round((bust - first) / spacing)
         count = int((length - first) / spacing - _LEFT_BELOW) + 1
-    if count < 2 or spacing <= buttons.diameter:
-        raise InputError(f"no room for buttons {1e3 * buttons.diameter:.0f} mm wide on {1e3 * length:.0f} mm")
+    if count < 2 or spacing <= opening.button:
+        raise InputError(f"no room for buttons {opening.button_mm:.0f} mm wide on {1e3 * length:.0f} mm")
     return np.asarray(first + spacing * np.arange(count))
 
 
-def with_button_stand(piece: Piece, name: str, opening: Opening, end: float, depths: FloatArray) -> Piece:
+def with_button_stand(piece: Piece, name: str, opening: OpeningTable, end: float, depths: FloatArray) -> Piece:
     """Return a piece that runs beyond one of its edges, with its buttons marked.
 
     The upper and the lower end of the stand are mirror images of the edges there, so that they lie upon the other
@@ -94,17 +94,16 @@ def with_button_stand(piece: Piece, name: str, opening: Opening, end: float, dep
         below = [step, replace(edge, points=np.vstack([foot[0], rest]))]
     new[name] = [Edge(name=f"{name} {STAND}", points=np.array([reach[-1], foot[-1]])), *below]
     # A mark for each button, and a line for each buttonhole across the stand.
-    assert opening.buttons is not None
     centres = [top + depth * along for depth in depths]
     lines = [(name, np.array([top, (top + min(end, edge.length) * along)]))]
     for centre in centres:
-        ends = centre + np.outer([_SHANK, _SHANK - opening.buttons.diameter - _THICKNESS], out)
+        ends = centre + np.outer([_SHANK, _SHANK - opening.button - _THICKNESS], out)
         bars = [("buttonhole end", end + np.outer([-_BAR, _BAR], along)) for end in ends]
         lines += [("buttonhole", ends), *bars]
     return drawn_on(_with_sides(piece, name, new), lines, [("button", centre) for centre in centres])
 
 
-def with_wrap(piece: Piece, name: str, opening: Opening) -> Piece:
+def with_wrap(piece: Piece, name: str, opening: OpeningTable) -> Piece:
     """Return a half that runs beyond a centre line, all along it, to lie over the other half.
 
     Its new edge, "wrap edge", ends as far beyond the line as the wrap is wide, measured along the mirror images of the half's upper and

@@ -6,12 +6,13 @@ A collar that is turned down is as long along its outer edge as the line on whic
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from warpflat.core import InputError, part_between, polyline_length
 from warpflat.garment.construction.button_stand import buttonhole
+from warpflat.garment.construction.details import FinishingTable
 from warpflat.garment.construction.edges import (
     Place,
     added,
@@ -39,10 +40,8 @@ from warpflat.garment.construction.free_edges import (
 from warpflat.garment.construction.strips import Strip, strip_edges, swept
 from warpflat.pattern import Edge, Pattern, Piece, SeamSide, drawn_length
 
-__all__ = ["COLLARS", "Collar", "with_collar", "with_hood"]
+__all__ = ["with_collar", "with_hood"]
 
-#: By style the width in the middle of the back [m]: of a stand, of a stand below a fall, of a collar in one with its stand, of a flat one.
-COLLARS = {"stand": 0.035, "shirt": 0.030, "convertible": 0.075, "flat": 0.065, "turtleneck": 0.060}
 # A flat collar is drafted with the shoulders lapped by this angle [rad], about a centimetre at their ends: it rolls a little.
 _LAPPED = 0.10
 # Share of a convertible collar that stands up.
@@ -61,31 +60,10 @@ _HOOD_HEM = 0.030
 _AROUND = ("right end", "upper", "left end")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Collar:
-    """What a collar or hood is like.
-
-    Attributes:
-        style: one of `COLLARS`; "" for a hood.
-        width: in the middle of the back [m]; of a shirt's collar that of its stand.
-        rise: by how much a stand's front ends lie higher than its middle [m], so that it leans to the neck.
-        fall: width of a shirt collar's fall in the middle of the back [m].
-        point: length of the front edge of a fall, or of a collar with points [m].
-        strip: width of the strip over the crown of a hood of three pieces [m]; 0 for one of two.
-    """
-
-    style: str
-    width: float
-    rise: float = 0.015
-    fall: float = 0.045
-    point: float = 0.065
-    strip: float = 0.0
-
-
 def with_collar(
     pattern: Pattern,
     places: Sequence[Place],
-    collar: Collar,
+    collar: FinishingTable,
     *,
     gaps: Collection[str] = (),
     breaks: Sequence[Break] = (),
@@ -160,7 +138,7 @@ def _turned_down(length: float, high: float, longer: float, tip: float) -> Strip
     return Strip(length=length, height=high, turn=-turn, even=True, tip=tip, lean=_LEAN)
 
 
-def _with_stand(pattern: Pattern, chain: FreeChain, collar: Collar) -> Pattern:
+def _with_stand(pattern: Pattern, chain: FreeChain, collar: FinishingTable) -> Pattern:
     """Return a pattern with a stand along the whole neckline, and with the fall that is sewn into its upper edge, if it has one."""
     import shapely
 
@@ -168,7 +146,7 @@ def _with_stand(pattern: Pattern, chain: FreeChain, collar: Collar) -> Pattern:
     high, covers = collar.width, collar.fall - collar.width
     if collar.style == "shirt" and covers < _COVERS:
         raise InputError(
-            f"the fall of a shirt collar hides the seam of its stand: fall_mm = {1e3 * collar.fall:g} must be at least "
+            f"the fall of a shirt collar hides the seam of its stand: fall_mm = {collar.fall_mm:g} must be at least "
             f"{1e3 * _COVERS:g} more than width_mm = {1e3 * high:g}"
         )
 
@@ -221,7 +199,7 @@ def _with_stand(pattern: Pattern, chain: FreeChain, collar: Collar) -> Pattern:
 def with_hood(
     pattern: Pattern,
     places: Sequence[Place],
-    collar: Collar,
+    wish: FinishingTable,
     heads: Mapping[str, float],
     *,
     gaps: Collection[str] = (),
@@ -231,7 +209,7 @@ def with_hood(
     Args:
         pattern: with all its openings.
         places: pieces and edges of the neckline.
-        collar: with the width of the strip.
+        wish: with the width of its strip.
         heads: girth of the head by size [m].
         gaps: names of seams that an opening leaves open there.
 
@@ -242,7 +220,7 @@ def with_hood(
     chains = _long_chains(pattern, places, gaps, breaks)
     if len(chains) != 1 or chains[0].closed or not _ends_in_front(pattern, chains[0]):
         raise InputError("a hood begins and ends at the centre front, and this neckline does not")
-    chain, strip = chains[0], collar.strip
+    chain, strip = chains[0], wish.strip
     hood, middle = free_piece_name(pattern, "hood"), free_piece_name(pattern, "hood_strip")
 
     def draw(like: Piece) -> list[Piece]:

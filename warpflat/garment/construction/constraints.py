@@ -25,6 +25,7 @@ from warpflat.garment.construction.mirror import mirror_partners
 
 if TYPE_CHECKING:
     from warpflat.flat import Flattening
+    from warpflat.garment.construction.details import OpeningTable
     from warpflat.garment.mannequin.forms import FormResult
 
 __all__ = [
@@ -38,6 +39,7 @@ __all__ = [
     "equations_of_constraint",
     "find_piece",
     "straight_hems",
+    "straight_stands",
 ]
 
 # The arm's levels at which sleeves end. An upper arm tapers, and an elbow that is bent makes the cloth below it as long as it is bent,
@@ -278,4 +280,15 @@ def straight_hems(form: FormResult, asked: Sequence[Constraint]) -> list[Straigh
         for name, piece in form.pieces.items()
         for edge in piece.edges
         if edge.split(" ")[0] in _SLEEVE_HEMS and (name, edge) not in sewn and edge not in sum(piece.darts.values(), ())
+    ]
+
+
+def straight_stands(form: FormResult, openings: Sequence[OpeningTable]) -> list[Constraint]:
+    """Return the constraints that lay the edges of button stands and wraps straight along the grain; a fold is so anyway."""
+    return [
+        Straight(piece=name, line=opening.seam, along="warp")
+        for opening in openings
+        if opening.kind in ("buttons", "wrap")
+        for name, piece in form.pieces.items()
+        if opening.seam in piece.edges and piece.fold != opening.seam
     ]

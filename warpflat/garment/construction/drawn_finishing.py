@@ -18,7 +18,7 @@ from warpflat.garment.mannequin.slicer import UP
 from warpflat.pattern import ViewedPiece
 
 if TYPE_CHECKING:
-    from warpflat.garment.construction.finishing import Finishing
+    from warpflat.garment.construction.details import FinishingTable
     from warpflat.garment.construction.form_garment import FormGarment
 
 __all__ = ["finishing_views"]
@@ -174,7 +174,7 @@ def _chains(garment: FormGarment, called: str) -> Iterator[_Chain]:
         yield chain.begun_at(int(points[:, 0].argmax())) if closed else chain
 
 
-def _sheets(wish: Finishing, chain: _Chain) -> Iterator[_Sheet]:
+def _sheets(wish: FinishingTable, chain: _Chain) -> Iterator[_Sheet]:
     """Yield what is drawn of a finishing along one chain."""
     columns = np.arange(len(chain.points), dtype=float)
     level = unit(chain.out * [1.0, 0.0, 1.0])
@@ -188,11 +188,11 @@ def _sheets(wish: Finishing, chain: _Chain) -> Iterator[_Sheet]:
         yield _falling(wish, chain, columns, level)
     elif wish.kind == "hood":
         yield _hood(chain.from_front())
-    elif wish.kind == "collar" and wish.collar is not None:
+    elif wish.kind == "collar":
         yield from _collar(wish, chain, level)
 
 
-def _falling(wish: Finishing, chain: _Chain, columns: FloatArray, level: FloatArray) -> _Sheet:
+def _falling(wish: FinishingTable, chain: _Chain, columns: FloatArray, level: FloatArray) -> _Sheet:
     """Return a ruffle or flounce as it falls from its edge: with pleats, gathers or folds."""
     arc = arc_lengths(chain.points)
     shorten = wish.shorten if isinstance(wish.shorten, float) else 0.0
@@ -213,11 +213,9 @@ def _falling(wish: Finishing, chain: _Chain, columns: FloatArray, level: FloatAr
     return _Sheet(rows=np.stack([start, hem]), out=chain.out, lines=tuple(lines))
 
 
-def _collar(wish: Finishing, chain: _Chain, level: FloatArray) -> Iterator[_Sheet]:
+def _collar(wish: FinishingTable, chain: _Chain, level: FloatArray) -> Iterator[_Sheet]:
     """Yield a collar as it stands or is turned down, and the placket below it."""
-    collar = wish.collar
-    assert collar is not None
-    if collar.style == "turtleneck":
+    if wish.style == "turtleneck":
         yield _Sheet(rows=np.stack([chain.points, chain.points + wish.width * UP]), out=level)
         return
     chain = chain.from_front()
@@ -225,18 +223,18 @@ def _collar(wish: Finishing, chain: _Chain, level: FloatArray) -> Iterator[_Shee
     arc = arc_lengths(chain.points)
     # From nothing in the middle to one at both ends, in the front.
     ends = np.clip(np.abs(2.0 * arc / arc[-1] - 1.0) * 4.0 - 3.0, 0.0, 1.0)[:, None]
-    if collar.style == "stand":
-        rows = [chain.points, chain.points + collar.width * (UP - 0.2 * level)]
-    elif collar.style == "flat":
-        wide = collar.width * np.sqrt(np.clip(1.0 - 0.7 * ends**4, 0.0, 1.0))
+    if wish.style == "stand":
+        rows = [chain.points, chain.points + wish.width * (UP - 0.2 * level)]
+    elif wish.style == "flat":
+        wide = wish.width * np.sqrt(np.clip(1.0 - 0.7 * ends**4, 0.0, 1.0))
         rows = [chain.points, chain.points - wide * chain.beyond + 0.004 * chain.out]
     else:
-        stand, fall = collar.width, collar.fall
-        if collar.style == "convertible":
-            stand, fall = 0.4 * collar.width, 0.6 * collar.width
+        stand, fall = wish.width, wish.fall
+        if wish.style == "convertible":
+            stand, fall = 0.4 * wish.width, 0.6 * wish.width
         inwards = np.sign(0.5 * arc[-1] - arc)[:, None] * unit(np.gradient(chain.points, axis=0))
-        top = chain.points + stand * (1.0 - (collar.style == "convertible") * ends) * UP
-        long = fall * 1.2 + ends * (collar.point - fall * 1.2)
+        top = chain.points + stand * (1.0 - (wish.style == "convertible") * ends) * UP
+        long = fall * 1.2 + ends * (wish.point - fall * 1.2)
         rows = [top, top + long * unit(-UP + 0.5 * level + 0.7 * ends * inwards)]
     yield _Sheet(rows=np.stack(rows), out=level)
     if wish.placket:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, line_name, nearest, other_side, without_side
+from warpflat.core import FloatArray, InputError, line_name, nearest, without_side
 from warpflat.garment.construction.button_stand import buttonhole
-from warpflat.garment.construction.collars import Collar, with_collar, with_hood
+from warpflat.garment.construction.collars import with_collar, with_hood
+from warpflat.garment.construction.details import FinishingTable
 from warpflat.garment.construction.edges import (
     Place,
     added,
@@ -29,22 +30,8 @@ from warpflat.garment.construction.shaped_band import shortened, slant_rises, wi
 from warpflat.garment.construction.strips import NARROW, Strip, panel_count
 from warpflat.pattern import CLOTH_WIDTH, Edge, Elastic, Pattern, Piece, SeamSide
 
-__all__ = ["FINISHES", "Finishing", "finish_edges", "hem_rises", "with_plackets"]
+__all__ = ["finish_edges", "hem_rises", "with_plackets"]
 
-#: By kind the width of a finishing piece [m]; of what is folded that of the finished piece, which is cut twice as wide.
-FINISHES = {
-    "facing": 0.06,
-    "band": 0.02,
-    "waistband": 0.035,
-    "binding": 0.035,
-    "cuff": 0.06,
-    "ruffle": 0.08,
-    "flounce": 0.12,
-    "casing": 0.03,
-    "collar": 0.032,
-    "hood": 0.0,
-    "hem": 0.0,
-}
 #: Strips by kind: whether they are folded, the direction of their grain, their role.
 _STRIPS = {
     "band": (True, (0.0, 1.0), "strip"),
@@ -57,56 +44,9 @@ _STRIPS = {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
-class Finishing:
-    """A finishing of free edges.
-
-    Attributes:
-        kind: one of `FINISHES`.
-        edge: name of the edges, without their side: "neck", "armhole", "waist".
-        width: [m].
-        share: length of a strip over that of its edge: a band is stretched, what is sewn to a waistband or cuff is gathered,
-            and a ruffle is gathered itself.
-        overlap: by how much a waistband or cuff runs past one end [m].
-        shaped: whether a waistband is cut from the upper strip of the pieces, as curved as they are, not straight.
-        shorten: by how much the pieces end before the edge, since the strip takes the place [m]; by line, where lines meet the edge.
-        elastic: length of the elastic in a folded strip or casing, as a share of the body's girth there; 0 where there is none.
-        placket: length of a slit that opens the edge [m]; below a collar in the centre front.
-        pleat: visible width of a pleat of a ruffle that is laid in pleats, not gathered [m]; 0 for none.
-        turns: how much of a circle a flounce is; more than one overlaps itself and is cut in pieces.
-        collar: what a collar or hood is like.
-    """
-
-    kind: str
-    edge: str
-    width: float
-    share: float = 1.0
-    overlap: float = 0.0
-    shaped: bool = False
-    shorten: float | Mapping[str, float] = 0.0
-    elastic: float = 0.0
-    placket: float = 0.0
-    pleat: float = 0.0
-    turns: float = 0.5
-    collar: Collar | None = None
-
-    @property
-    def is_one_sided(self) -> bool:
-        """Whether it makes one side of the body unlike the other."""
-        by_line = self.shorten if isinstance(self.shorten, Mapping) else {}
-        return any(
-            by_line.get(other_side(line)) != wide for line, wide in by_line.items() if without_side(line) != line
-        )
-
-    @property
-    def name(self) -> str:
-        """Return what its pieces are called."""
-        return self.kind if self.kind in ("waistband", "cuff", "collar") else f"{self.edge}_{self.kind}"
-
-
 def finish_edges(
     pattern: Pattern,
-    finishing: Sequence[Finishing],
+    finishing: Sequence[FinishingTable],
     *,
     gaps: Collection[str] = (),
     stands: Sequence[Stand] = (),
@@ -150,17 +90,17 @@ def finish_edges(
                 count = 2 if any(without_side(edge) != edge for _, edge in places) else 1
                 elastic = Elastic(edge=wish.edge, width=wish.width, lengths=lengths, count=count)
                 pattern = replace(pattern, elastics=(*pattern.elastics, elastic))
-            collar, breaks = wish.collar, list[Break]()
+            breaks = list[Break]()
             if wish.kind == "facing":
                 pattern = with_facings(pattern, places, wish.width, gaps=gaps, stands=stands)
-            elif collar is not None and wish.kind == "hood":
+            elif wish.kind == "hood":
                 heads = {size: _girth_at(size, ["head"], girths or {}) for size in pattern.pieces}
-                pattern = with_hood(pattern, places, collar, heads, gaps=gaps)
-            elif collar is not None and collar.style != "turtleneck":
+                pattern = with_hood(pattern, places, wish, heads, gaps=gaps)
+            elif wish.kind == "collar" and wish.style != "turtleneck":
                 if wish.placket:
                     pattern, breaks = with_placket(pattern, places, wish.placket, wish.edge)
                     pattern, places = _opened_up(pattern, wish.edge)
-                pattern = with_collar(pattern, places, collar, gaps=gaps, breaks=breaks)
+                pattern = with_collar(pattern, places, wish, gaps=gaps, breaks=breaks)
             elif wish.kind == "casing":
 
                 def turned_in(_: Piece, edge: Edge, wide: float = wish.width + NARROW) -> list[Edge]:
@@ -192,7 +132,7 @@ def _said_of(number: int) -> Iterator[None]:
         raise InputError(f"finishing[{number}]: {error}") from None
 
 
-def hem_rises(pattern: Pattern, finishing: Sequence[Finishing]) -> dict[Place, tuple[FloatArray, FloatArray]]:
+def hem_rises(pattern: Pattern, finishing: Sequence[FinishingTable]) -> dict[Place, tuple[FloatArray, FloatArray]]:
     """Return how wide a strip slanted hems lose in the sample size, as :func:`slant_rises` gives it."""
     found = dict[Place, tuple[FloatArray, FloatArray]]()
     for wish in finishing:
@@ -202,7 +142,7 @@ def hem_rises(pattern: Pattern, finishing: Sequence[Finishing]) -> dict[Place, t
     return found
 
 
-def with_plackets(opened: Mapping[str, float], finishing: Sequence[Finishing]) -> dict[str, float]:
+def with_plackets(opened: Mapping[str, float], finishing: Sequence[FinishingTable]) -> dict[str, float]:
     """Return what openings add to rings [m], with both edges of the plackets below collars."""
     found = dict(opened)
     for wish in finishing:
@@ -254,7 +194,7 @@ def _girth_at(size: str, levels: Sequence[str], girths: Mapping[str, Mapping[str
     raise InputError(f"the body has no girth at {levels[0]!r}; {nearest(levels[0], own)}")
 
 
-def _with_strip(pattern: Pattern, wish: Finishing, chain: FreeChain, count: int, cloth_width: float) -> Pattern:
+def _with_strip(pattern: Pattern, wish: FinishingTable, chain: FreeChain, count: int, cloth_width: float) -> Pattern:
     """Return a pattern with one strip along a chain of free edges, cut `count` times.
 
     A strip that is wider than the cloth is cut as equal panels, of which one is drawn. One that is laid in pleats begins and ends in the
@@ -336,6 +276,6 @@ def _with_strip(pattern: Pattern, wish: Finishing, chain: FreeChain, count: int,
     return pattern
 
 
-def _pleat_count(wish: Finishing, length: float) -> int:
+def _pleat_count(wish: FinishingTable, length: float) -> int:
     """Return how many pleats a panel of a strip of that length [m] is laid in."""
     return max(1, round(length / wish.share / wish.pleat))

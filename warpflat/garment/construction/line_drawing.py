@@ -17,7 +17,7 @@ from warpflat.garment.construction.button_stand import button_depths
 from warpflat.garment.construction.drawn_finishing import finishing_views
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.mark_openings import TIE_WIDTH
-from warpflat.garment.construction.openings import Buttons, place_opening
+from warpflat.garment.construction.openings import place_opening
 from warpflat.pattern import ClothKind, Measure, NeededOpening, Piece, ViewedPiece, Worn
 
 if TYPE_CHECKING:
@@ -224,10 +224,10 @@ def _openings(garment: FormGarment, sign: float) -> Iterator[ViewedPiece]:
             if opening.kind == "zip":
                 shapes += [(float(tooth), _BAR / 3) for tooth in np.arange(opening.start, end, _TOOTH)]
             if opening.kind == "buttons":
-                wanted, grid = opening.buttons or Buttons(), garment.form.pieces[part.piece].grid_vertices
+                grid = garment.form.pieces[part.piece].grid_vertices
                 at_bust = arc[np.isin(grid[part.vertices], bust)]
-                depths = button_depths(wanted, end, float(at_bust[0]) if len(at_bust) else None)
-                shapes = [(depth, 0.5 * wanted.diameter * _CIRCLE) for depth in depths.tolist()]
+                depths = button_depths(opening, end, float(at_bust[0]) if len(at_bust) else None)
+                shapes = [(depth, 0.5 * opening.button * _CIRCLE) for depth in depths.tolist()]
             for at, shape in shapes:
                 if arc[0] <= at <= arc[-1]:
                     lines.append(shape + [np.interp(at, arc, seen[:, axis]) for axis in (0, 1)])

@@ -10,6 +10,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, InputError, find_unused_name, part_between, polyline_length
 from warpflat.garment.construction.button_stand import bust_depth, button_depths, with_button_stand, with_wrap
+from warpflat.garment.construction.details import OpeningTable
 from warpflat.garment.construction.edges import (
     ON,
     added,
@@ -31,7 +32,7 @@ from warpflat.garment.construction.edges import (
     sewn_places,
     with_pieces,
 )
-from warpflat.garment.construction.openings import Opening, OpeningPart
+from warpflat.garment.construction.openings import OpeningPart
 from warpflat.garment.construction.strips import folded_strip
 from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamOpening, SeamSide
 
@@ -52,7 +53,7 @@ Placed = Mapping[str, Sequence[Sequence[OpeningPart]]]
 _Parts = Mapping[str, Sequence[OpeningPart]]
 
 
-def mark_openings(pattern: Pattern, openings: Sequence[Opening], placed: Placed) -> Pattern:
+def mark_openings(pattern: Pattern, openings: Sequence[OpeningTable], placed: Placed) -> Pattern:
     """Return a pattern with its openings drawn.
 
     A zip is a line along its edges with its name, and a notch at its end. A slit or a vent is an edge of its own, which
@@ -79,7 +80,7 @@ def mark_openings(pattern: Pattern, openings: Sequence[Opening], placed: Placed)
     return pattern
 
 
-def _with_opening(pattern: Pattern, opening: Opening, part: OpeningPart, parts: _Parts) -> Pattern:
+def _with_opening(pattern: Pattern, opening: OpeningTable, part: OpeningPart, parts: _Parts) -> Pattern:
     """Return a pattern with what an opening does to one of its seams, or to the piece across which it lies."""
     if opening.kind == "keyhole":
         return redrawn(pattern, part.piece, lambda piece: _keyhole(piece, opening))
@@ -119,7 +120,7 @@ def _with_opening(pattern: Pattern, opening: Opening, part: OpeningPart, parts: 
     return _with_godet(pattern, seam, opening) if opening.kind == "godet" else pattern
 
 
-def _reach(opening: Opening, part: OpeningPart) -> tuple[float, float]:
+def _reach(opening: OpeningTable, part: OpeningPart) -> tuple[float, float]:
     """Return where along a seam, from the end of measuring, an opening begins and ends [m]."""
     begin, end = opening.start - part.before, opening.start + opening.length - part.before
     return max(0.0, begin), min(part.whole, end)
@@ -129,7 +130,7 @@ def _part_of(parts: Sequence[OpeningPart], seam: Seam) -> OpeningPart:
     return next(part for part in parts if part.seam == seam.name)
 
 
-def _length(opening: Opening, parts: Sequence[OpeningPart]) -> float:
+def _length(opening: OpeningTable, parts: Sequence[OpeningPart]) -> float:
     """Return how long an opening is that runs along some seams [m]: at most all along them."""
     return min(opening.length, sum(each.whole for each in parts))
 
@@ -139,7 +140,7 @@ def _with_seam(pattern: Pattern, seam: Seam) -> Pattern:
     return replace(pattern, seams=[seam if each.name == seam.name else each for each in pattern.seams])
 
 
-def _with_zip(pattern: Pattern, seam: Seam, opening: Opening, parts: _Parts, *, ends: bool) -> Pattern:
+def _with_zip(pattern: Pattern, seam: Seam, opening: OpeningTable, parts: _Parts, *, ends: bool) -> Pattern:
     """Return a pattern with the line of a zip beside the edges of a seam, and a notch where it ends, if it does within the seam."""
     import shapely
 
@@ -150,7 +151,7 @@ def _with_zip(pattern: Pattern, seam: Seam, opening: Opening, parts: _Parts, *, 
             begin, stop = _reach(opening, _part_of(row, seam))
             line = np.asarray(shapely.LineString(piece.edge(edge).points).offset_curve(_INSIDE).coords)
             line = line if runs_down(piece, line) else line[::-1]
-            title = replace(opening, length=_length(opening, row)).title
+            title = f"{opening.style} zip {1e3 * _length(opening, row):.0f} mm"
             return drawn_on(piece, [(title, part_between(line, begin, min(stop, polyline_length(line))))])
 
         pattern = redrawn(pattern, side.piece, beside_edge)
@@ -179,9 +180,9 @@ def with_notches(pattern: Pattern, seam: Seam, lengths: Mapping[str, Sequence[fl
     return _with_seam(pattern, replace(seam, notches=by_size[pattern.sample], size_notches=by_size))
 
 
-def _with_buttons(pattern: Pattern, seam: Seam, opening: Opening, parts: _Parts) -> Pattern:
+def _with_buttons(pattern: Pattern, seam: Seam, opening: OpeningTable, parts: _Parts) -> Pattern:
     """Return a pattern with a button stand on both sides of a seam, which is sewn only below it."""
-    if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0 or opening.buttons is None:
+    if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0:
         raise InputError("buttons begin at the upper end of a seam between two edges")
     places = list(dict.fromkeys(side.place for side in seam.stretches))
     name, edge = places[0]
@@ -190,7 +191,7 @@ def _with_buttons(pattern: Pattern, seam: Seam, opening: Opening, parts: _Parts)
     for size in sorted(pattern.pieces, key=lambda each: each != pattern.sample):
         bust = bust_depth(pattern.piece(name, size), edge)
         depths[size] = button_depths(
-            opening.buttons, _length(opening, parts[size]), None if bust is None else _part_of(parts[size], seam).before + bust,
+            opening, _length(opening, parts[size]), None if bust is None else _part_of(parts[size], seam).before + bust,
             len(depths[pattern.sample]) if depths else None,
         )  # fmt: skip
 
@@ -208,7 +209,7 @@ def _with_buttons(pattern: Pattern, seam: Seam, opening: Opening, parts: _Parts)
     return with_pieces(pattern, [buttoned(piece, edge) for name, edge in places for piece in in_sizes(pattern, name)])
 
 
-def _with_godet(pattern: Pattern, seam: Seam, opening: Opening) -> Pattern:
+def _with_godet(pattern: Pattern, seam: Seam, opening: OpeningTable) -> Pattern:
     """Return a pattern with a wedge, a sector of a circle, in the lower end of a seam, whose edges have that end as edges of their own.
 
     On the fold a seam stands for both sides of the body.
@@ -247,7 +248,7 @@ def _with_godet(pattern: Pattern, seam: Seam, opening: Opening) -> Pattern:
     return pattern
 
 
-def _with_wrap(pattern: Pattern, seam: Seam, opening: Opening) -> Pattern:
+def _with_wrap(pattern: Pattern, seam: Seam, opening: OpeningTable) -> Pattern:
     """Return a pattern whose halves run beyond a centre line, each over the other; they are not sewn there, but tied."""
     edges = {side.piece: side.edge for side in seam.stretches}
     pattern = replace(pattern, seams=[each for each in pattern.seams if each.name != seam.name])
@@ -261,12 +262,12 @@ def _with_wrap(pattern: Pattern, seam: Seam, opening: Opening) -> Pattern:
     )
 
 
-def _keyhole(piece: Piece, opening: Opening) -> Piece:
+def _keyhole(piece: Piece, opening: OpeningTable) -> Piece:
     import shapely
 
-    line = lines_of(piece).get(opening.line)
+    line = lines_of(piece).get(opening.seam)
     if line is None:
-        raise InputError(f"a keyhole is cut along a line inside its piece; {piece.name} has no {opening.line!r} inside")
+        raise InputError(f"a keyhole is cut along a line inside its piece; {piece.name} has no {opening.seam!r} inside")
     slit = part_between(line if runs_down(piece, line) else line[::-1], 0.0, opening.length)
     along = direction(slit)
     across, radius = np.array([along[1], -along[0]]), 0.5 * opening.width
@@ -283,7 +284,7 @@ def _keyhole(piece: Piece, opening: Opening) -> Piece:
     return drawn_on(piece, lines_inside(shapes, piece.outline).items(), marks)
 
 
-def _free_end(piece: Piece, edge: Edge, opening: Opening) -> Sequence[Edge]:
+def _free_end(piece: Piece, edge: Edge, opening: OpeningTable) -> Sequence[Edge]:
     """Return an edge of a piece with its lower end as an edge of its own."""
     free = find_unused_name(f"{edge.name} {opening.kind}", {each.name for each in piece.edges})
     how: dict[str, Any] = {} if opening.kind == "godet" else {"kind": "hem", "allowance": opening.width}

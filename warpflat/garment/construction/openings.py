@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest, other_side, without_side
+from warpflat.garment.construction.details import OpeningTable
 from warpflat.garment.construction.rings import find_rings, ring_line
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.forms import Form, PieceRecipe
 from warpflat.garment.mannequin.halves import is_side
 from warpflat.garment.mannequin.layout import RING_LEVELS
+from warpflat.pattern import EdgeRules
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.forms import FormResult
@@ -23,85 +25,17 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CENTRES",
-    "Buttons",
-    "Opening",
     "OpeningPart",
     "one_sided",
     "opened_rings",
     "part_at_centres",
     "place_opening",
+    "sewn_centres",
     "sized_opening",
 ]
 
+#: The lines at which a piece may be cut in halves.
 CENTRES = ("centre front", "centre back")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Buttons:
-    """The buttons of a stand, and its facing.
-
-    Attributes:
-        diameter: of a button [m].
-        spacing: about how far apart they are [m]; one lies on the bust line, where a front gapes first.
-        count: how many; None as many as the spacing gives.
-        facing: "grown-on" (the stand is folded) or "separate" (a piece of its own).
-        facing_width: from the edge of the stand [m].
-    """
-
-    diameter: float = 0.018
-    spacing: float = 0.085
-    count: int | None = None
-    facing: str = "grown-on"
-    facing_width: float = 0.06
-
-
-@dataclass(frozen=True, kw_only=True)
-class Opening:
-    """A stretch of a seam that can be opened, or is never closed.
-
-    Attributes:
-        kind: "zip", "buttons", "wrap" or "keyhole" from the upper end of the line; "slit", "vent" or "godet" from its lower end.
-        line: of the seam, as "centre back" or "side left"; pieces that run across a centre line are parted there, except
-            by a keyhole, which is cut into the piece.
-        length: [m]; infinite for a wrap, and for buttons or a zip all along the line.
-        share: of its line, in place of the length; 0 if that is given.
-        start: how far from that end it begins [m].
-        style: of a zip, "invisible" or "lapped".
-        width: of a vent's flap, of the button stand or the wrap beyond its line, of a godet's hem, or of a keyhole's round end [m].
-        buttons: of a button stand.
-        tie: length of the ties of a wrap [m]; 0 for none.
-    """
-
-    kind: str
-    line: str
-    length: float
-    share: float = 0.0
-    start: float = 0.0
-    style: str = "invisible"
-    width: float = 0.04
-    buttons: Buttons | None = None
-    tie: float = 0.0
-
-    @property
-    def from_below(self) -> bool:
-        """Whether it is measured from the lower end of its line."""
-        return self.kind in ("slit", "vent", "godet")
-
-    @property
-    def parts_pieces(self) -> bool:
-        """Whether pieces that run across its line are parted there."""
-        return self.kind != "keyhole"
-
-    @property
-    def opens_the_top(self) -> bool:
-        """Whether it runs out into the upper edge."""
-        return not self.from_below and self.start == 0.0
-
-    @property
-    def title(self) -> str:
-        """Return what is written on the pieces."""
-        words = f"{self.style} zip" if self.kind == "zip" else self.kind
-        return f"{words} {1e3 * self.length:.0f} mm"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -123,10 +57,10 @@ class OpeningPart:
     whole: float
 
 
-def part_at_centres(layout: Layout, form: Form, openings: Sequence[Opening]) -> Form:
+def part_at_centres(layout: Layout, form: Form, openings: Sequence[OpeningTable]) -> Form:
     """Return a form whose pieces are parted along the centre lines that have openings; a piece "back" becomes two."""
     pieces = dict(form.pieces)
-    for line in dict.fromkeys(opening.line for opening in openings if opening.line in CENTRES and opening.parts_pieces):
+    for line in dict.fromkeys(opening.seam for opening in openings if opening.seam in CENTRES and opening.parts_pieces):
         parted: dict[str, PieceRecipe] = {}
         for name, recipe in pieces.items():
             bricks = select_bricks(layout, recipe.bricks)
@@ -141,7 +75,13 @@ def part_at_centres(layout: Layout, form: Form, openings: Sequence[Opening]) -> 
     return replace(form, pieces=pieces)
 
 
-def place_opening(form: FormResult, opening: Opening, positions: Mapping[str, FloatArray]) -> list[OpeningPart]:
+def sewn_centres(rules: EdgeRules, openings: Sequence[OpeningTable]) -> EdgeRules:
+    """Return rules by which a half piece has a seam instead of the fold at the centre lines that have openings."""
+    lines = {opening.seam: "seam" for opening in openings if opening.seam in CENTRES and opening.parts_pieces}
+    return replace(rules, kinds={**lines, **rules.kinds})
+
+
+def place_opening(form: FormResult, opening: OpeningTable, positions: Mapping[str, FloatArray]) -> list[OpeningPart]:
     """Return the seams along an opening's line, from the end at which it is measured.
 
     Args:
@@ -155,18 +95,18 @@ def place_opening(form: FormResult, opening: Opening, positions: Mapping[str, Fl
     """
     found: list[tuple[str, str, IntArray]] = []
     for seam in form.seams:
-        if seam.edges[0] == opening.line or seam.name == opening.line:
+        if seam.edges[0] == opening.seam or seam.name == opening.seam:
             found.append((seam.name, seam.pieces[0], np.concatenate([run.vertices[0] for run in seam.runs])))
     for name, piece in form.pieces.items():
-        if piece.fold == opening.line:
-            found.append((opening.line, name, np.asarray(piece.edges[opening.line])))
-        elif not opening.parts_pieces and opening.line in piece.surface.lines:
-            found.append((opening.line, name, np.asarray(piece.surface.lines[opening.line])))
+        if piece.fold == opening.seam:
+            found.append((opening.seam, name, np.asarray(piece.edges[opening.seam])))
+        elif not opening.parts_pieces and opening.seam in piece.surface.lines:
+            found.append((opening.seam, name, np.asarray(piece.surface.lines[opening.seam])))
     if opening.kind == "keyhole":
         found = found[:1]
     if not found:
         folds = {piece.fold for piece in form.pieces.values() if piece.fold}
-        raise InputError(f"no seam {opening.line!r}; {nearest(opening.line, {s.name for s in form.seams} | folds)}")
+        raise InputError(f"no seam {opening.seam!r}; {nearest(opening.seam, {s.name for s in form.seams} | folds)}")
     sign = 1.0 if opening.from_below else -1.0
     rows = []
     for seam_name, piece_name, ids in found:
@@ -179,35 +119,36 @@ def place_opening(form: FormResult, opening: Opening, positions: Mapping[str, Fl
         before += whole
     end = opening.start + opening.length
     if math.isfinite(end) and end > before:
-        raise InputError(f"ends {1e3 * end:.0f} mm along {opening.line!r}, which is {1e3 * before:.0f} mm long")
+        raise InputError(f"ends {1e3 * end:.0f} mm along {opening.seam!r}, which is {1e3 * before:.0f} mm long")
     return parts
 
 
-def sized_opening(form: FormResult, opening: Opening, positions: Mapping[str, FloatArray]) -> Opening:
+def sized_opening(form: FormResult, opening: OpeningTable, positions: Mapping[str, FloatArray]) -> OpeningTable:
     """Return an opening whose share of its line has become a length, in whole centimetres; see :func:`place_opening`."""
     whole = sum(part.whole for part in place_opening(form, opening, positions))
-    if not opening.share:
+    if opening.length_share is None:
         return opening
-    length = 0.01 * math.floor(100.0 * (opening.share * whole - opening.start))
-    if length <= 0.0:
+    end = opening.length_share * whole
+    length = math.floor(100.0 * (end - opening.start))
+    if length <= 0:
         raise InputError(
-            f"length_share = {opening.share:g} ends {1e3 * opening.share * whole:.0f} mm along {opening.line!r}, "
+            f"length_share = {opening.length_share:g} ends {1e3 * end:.0f} mm along {opening.seam!r}, "
             f"and start_mm begins at {1e3 * opening.start:.0f}"
         )
-    return replace(opening, length=length, share=0.0)
+    return opening.model_copy(update={"length_mm": 10.0 * length, "length_share": None})
 
 
-def one_sided(openings: Sequence[Opening]) -> list[Opening]:
+def one_sided(openings: Sequence[OpeningTable]) -> list[OpeningTable]:
     """Return the openings for which pieces of one side of the body are cut unlike their mirror images.
 
     A zip is none: it is sewn into edges that are cut alike with and without it.
     """
-    cut = [opening for opening in openings if opening.kind != "zip" and without_side(opening.line) != opening.line]
-    return [opening for opening in cut if replace(opening, line=other_side(opening.line)) not in cut]
+    cut = [opening for opening in openings if opening.kind != "zip" and without_side(opening.seam) != opening.seam]
+    return [opening for opening in cut if opening.model_copy(update={"seam": other_side(opening.seam)}) not in cut]
 
 
 def opened_rings(
-    mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray], openings: Sequence[Opening]
+    mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray], openings: Sequence[OpeningTable]
 ) -> dict[str, float]:
     """Return by ring how much longer openings make it [m].
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -19,6 +19,7 @@ from warpflat.core import (
     points_at_lengths,
     polyline_length,
 )
+from warpflat.garment.construction.details import PocketTable
 from warpflat.garment.construction.edges import (
     backwards,
     beside,
@@ -41,7 +42,7 @@ from warpflat.garment.construction.mark_openings import with_notches
 from warpflat.garment.construction.strips import NARROW, Strip, folded_strip
 from warpflat.pattern import Edge, Pattern, Piece, SeamSide
 
-__all__ = ["Pocket", "add_pockets"]
+__all__ = ["add_pockets"]
 
 # Hem of a patch pocket, and how much lower its middle lies than its lower corners [m].
 _HEM, _POINT = 0.030, 0.015
@@ -55,35 +56,7 @@ _BESIDE, _WELT_ENDS = 0.015, 0.010
 _INWARDS, _DEEPER = 0.050, 0.110
 
 
-@dataclass(frozen=True, kw_only=True)
-class Pocket:
-    """A pocket.
-
-    Attributes:
-        kind: "patch", sewn onto a piece; "welt", an opening across a piece, with a welt; "inseam", bags in a seam; "hip", an opening
-            from the upper edge of the front to its seam.
-        where: the piece of a patch or welt, the seam of bags.
-        width, height: of a patch; length of the opening and depth of the bag of a welt; depth of a bag in a seam and length of its
-            opening; how far from the seam and below the upper edge a hip pocket's opening ends [m].
-        line: a line across the piece on which the upper edge of a patch or welt lies.
-        below: how far a patch or welt lies below its line, an opening below the upper end of its seam [m].
-        from_centre: distance of the inner side from the centre line [m]; on a leg, which has none, it lies in the middle.
-        welt: height of a welt [m].
-        most_share: of its line on the piece that a patch or welt is wide at most; its other lengths become smaller with its width.
-    """
-
-    kind: str
-    where: str
-    width: float
-    height: float
-    line: str = ""
-    below: float = 0.0
-    from_centre: float = 0.07
-    welt: float = 0.015
-    most_share: float = math.inf
-
-
-def add_pockets(pattern: Pattern, pockets: Sequence[Pocket]) -> Pattern:
+def add_pockets(pattern: Pattern, pockets: Sequence[PocketTable]) -> Pattern:
     """Return a pattern with pockets: their pieces, their places on pieces, their notches in seams.
 
     Raises:
@@ -100,17 +73,17 @@ def add_pockets(pattern: Pattern, pockets: Sequence[Pocket]) -> Pattern:
     return pattern
 
 
-def _with_placed(pattern: Pattern, pocket: Pocket) -> Pattern:
+def _with_placed(pattern: Pattern, pocket: PocketTable) -> Pattern:
     """Return a pattern with a patch or welt pocket and its place, on both sides of a piece that has both."""
     patch, welt, bag = (
-        free_piece_name(pattern, f"{pocket.where}_{what}") for what in ("pocket", "pocket_welt", "pocket_bag")
+        free_piece_name(pattern, f"{pocket.piece}_{what}") for what in ("pocket", "pocket_welt", "pocket_bag")
     )
 
     def placed(piece: Piece) -> tuple[Piece, ...]:
         # Smaller where its line is short.
-        smaller = min(1.0, pocket.most_share * polyline_length(_line_of(piece, pocket.line)) / pocket.width)
-        keys = ("width", "height", "below", "from_centre")
-        here = replace(pocket, **{key: smaller * getattr(pocket, key) for key in keys})
+        most = (pocket.most_share or math.inf) * polyline_length(_line_of(piece, pocket.line))
+        smaller, keys = min(1.0, most / pocket.width), ("width_mm", "height_mm", "below_mm", "from_centre_mm")
+        here = pocket.model_copy(update={key: smaller * getattr(pocket, key) for key in keys})
         places = _places(piece, here)
         count = len(places) * piece.quantity * (2 if piece.on_fold else 1)
         # Side by side, so that its corners stay sharp; the upper edge of a patch is left open.
@@ -130,7 +103,7 @@ def _with_placed(pattern: Pattern, pocket: Pocket) -> Pattern:
             new_piece(bag, piece, around, "pocket", quantity=2 * count),
         )
 
-    return redrawn(pattern, pocket.where, placed)
+    return redrawn(pattern, pocket.piece, placed)
 
 
 def _line_of(piece: Piece, name: str) -> FloatArray:
@@ -145,14 +118,14 @@ def _line_of(piece: Piece, name: str) -> FloatArray:
     return known[name]
 
 
-def _shape(pocket: Pocket) -> FloatArray:
+def _shape(pocket: PocketTable) -> FloatArray:
     """Return the corners of a patch, or of the opening of a welt, from its upper right one leftwards; its upper edge lies along y = 0."""
     half, high = 0.5 * pocket.width, pocket.height if pocket.kind == "patch" else pocket.welt
     corners = np.array([(half, 0.0), (-half, 0.0), (-half, -high), (0.0, -high - _POINT), (half, -high)])
     return corners if pocket.kind == "patch" else corners[[0, 1, 2, 4]]
 
 
-def _places(piece: Piece, pocket: Pocket) -> list[FloatArray]:
+def _places(piece: Piece, pocket: PocketTable) -> list[FloatArray]:
     """Return the corners of a patch or welt pocket wherever it lies on a piece.
 
     Raises:
@@ -176,7 +149,7 @@ def _places(piece: Piece, pocket: Pocket) -> list[FloatArray]:
     return found
 
 
-def _middles(piece: Piece, pocket: Pocket, across: FloatArray, level: float) -> list[float]:
+def _middles(piece: Piece, pocket: PocketTable, across: FloatArray, level: float) -> list[float]:
     """Return where across a piece the middles of its pockets lie [m]: beside its centre line, or in the middle of a leg.
 
     Args:
@@ -200,16 +173,16 @@ def _middles(piece: Piece, pocket: Pocket, across: FloatArray, level: float) -> 
     return [float(spots.min() + spots.max()) / 2] if len(spots) else []
 
 
-def _with_hip_pocket(pattern: Pattern, pocket: Pocket) -> Pattern:
+def _with_hip_pocket(pattern: Pattern, pocket: PocketTable) -> Pattern:
     """Return a pattern whose fronts are cut off from their upper edge to a side seam, with what lies behind the opening.
 
     The corner that is cut off belongs to a piece of its own, which is sewn in its place at the upper edge and in the seam. A bag of
     the same outline, without the corner, is sewn to the opening.
     """
-    names = {pocket.where, other_side(pocket.where)}
+    names = {pocket.seam, other_side(pocket.seam)}
     opened = [seam for seam in pattern.seams if seam.name in names]
     if not opened:
-        raise InputError(f"no seam {pocket.where!r}; {nearest(pocket.where, [seam.name for seam in pattern.seams])}")
+        raise InputError(f"no seam {pocket.seam!r}; {nearest(pocket.seam, [seam.name for seam in pattern.seams])}")
     # Of pieces that are cut in pairs both seams have one edge.
     fronts = dict[tuple[str, str], SeamSide]()
     for seam in opened:
@@ -222,7 +195,7 @@ def _with_hip_pocket(pattern: Pattern, pocket: Pocket) -> Pattern:
     return pattern
 
 
-def _cut_hip_pocket(pattern: Pattern, pocket: Pocket, front: SeamSide) -> Pattern:
+def _cut_hip_pocket(pattern: Pattern, pocket: PocketTable, front: SeamSide) -> Pattern:
     """Return a pattern with a hip pocket in one piece, whose edge lies in the seam."""
     sample = pattern.piece(front.piece, pattern.sample)
     facing, bag = (free_piece_name(pattern, f"{front.piece}_pocket_{what}") for what in ("facing", "bag"))
@@ -253,7 +226,7 @@ def _cut_hip_pocket(pattern: Pattern, pocket: Pocket, front: SeamSide) -> Patter
 
 
 def _hip_pocket(
-    piece: Piece, pocket: Pocket, upper: str, side: str, names: tuple[str, str, str], *, first: bool
+    piece: Piece, pocket: PocketTable, upper: str, side: str, names: tuple[str, str, str], *, first: bool
 ) -> tuple[Piece, Piece, Piece]:
     """Return a piece without its corner, what takes the corner's place, and the bag.
 
@@ -347,13 +320,13 @@ def _check_end(end: float, called: str, whole: float) -> None:
         raise InputError(f"the pocket ends {1e3 * end:.0f} mm along {called!r}, which is {1e3 * whole:.0f} mm long")
 
 
-def _with_bags(pattern: Pattern, pocket: Pocket) -> Pattern:
+def _with_bags(pattern: Pattern, pocket: PocketTable) -> Pattern:
     """Return a pattern with the bags of a pocket in a seam, and on the other side's too, and notches where they open."""
-    names = {pocket.where, other_side(pocket.where)}
+    names = {pocket.seam, other_side(pocket.seam)}
     opened = [seam for seam in pattern.seams if seam.name in names]
     if not opened or any(len(row) > 1 for seam in opened for row in seam.sides):
         raise InputError(
-            f"no seam {pocket.where!r} between two edges; {nearest(pocket.where, [seam.name for seam in pattern.seams])}"
+            f"no seam {pocket.seam!r} between two edges; {nearest(pocket.seam, [seam.name for seam in pattern.seams])}"
         )
     # Of halves, and of pieces that are cut in pairs, one seam is listed for both sides.
     joined = [pattern.piece(side.piece, pattern.sample) for row in opened[0].sides for side in row]

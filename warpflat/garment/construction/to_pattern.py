@@ -79,7 +79,7 @@ from warpflat.pattern import (
 
 if TYPE_CHECKING:
     from warpflat.flat import Crack, Flattening, Surface
-    from warpflat.garment.construction.border_seams import BorderSeam
+    from warpflat.garment.construction.border_seams import SeamTable
     from warpflat.garment.construction.garment import Garment
     from warpflat.garment.construction.openings import OpeningPart
     from warpflat.garment.construction.sewn import Stitching
@@ -174,16 +174,13 @@ def pattern_of_garment(
         if opening.opens_the_top
     ]
     stands = [
-        Stand(
-            piece=piece.name, edge=edge.name, width=opening.buttons.facing_width,
-            grown_on=opening.buttons.facing == "grown-on",
-        )
+        Stand(piece=piece.name, edge=edge.name, width=opening.facing_width, grown_on=opening.facing != "separate")
         for opening in sample.openings
-        if opening.buttons is not None
+        if opening.kind == "buttons"
         for piece in pattern.pieces[pattern.sample]
         for edge in piece.edges
-        if edge.name == f"{opening.line} {STAND}"
-    ]  # fmt: skip
+        if edge.name == f"{opening.seam} {STAND}"
+    ]
     rises = hem_rises(pattern, sample.finishing)
     with optional_step("the pattern has no finishing"):
         girths = {size: garment.body_girths for size, garment in laid.items()}
@@ -496,7 +493,7 @@ def pattern_of_surface(
     name: str,
     rules: EdgeRules | None = None,
     size: str = "",
-    seams: Sequence[BorderSeam] = (),
+    seams: Sequence[SeamTable] = (),
     ends: Mapping[str, Collection[int]] | None = None,
     worn: Collection[str] = (),
 ) -> tuple[Pattern, tuple[str, ...]]:
@@ -536,7 +533,7 @@ def pattern_of_surface(
     named = []
     for seam in seams:
         with optional_step(f"seam {seam.name!r} was left out of the pattern"):
-            first, second = (_edges_along(line, results, pieces) for line in seam.sides)
+            first, second = (_edges_along(line, results, pieces) for line in seam.lines)
             back = tuple(replace(side, reversed=True) for side in reversed(second))  # the two run against each other
             named.append(Seam(name=seam.name, sides=(first, back), ease=seam.ease))
     names = {p.name: [*(edge.name for edge in p.edges), *(hole.name for hole in p.holes)] for p in pieces}

@@ -1,4 +1,4 @@
-"""Sewn cloth is looked at before it is relaxed: whether its openings go around their limbs, and whether it is tangled."""
+"""Sewn cloth is looked at before it is relaxed: whether limbs go through its openings and not its cloth, and whether it is tangled."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import warp as wp
 from warpflat.core import BoolArray, FloatArray, IntArray, StepError, launch_each
 from warpflat.flat import mesh_edges
 from warpflat.garment.draping.body import Body
-from warpflat.garment.draping.limbs import links
+from warpflat.garment.draping.limbs import crossings, links
 from warpflat.garment.draping.openings import Opening
 from warpflat.garment.draping.sew_around import stretches
 from warpflat.garment.draping.sewn_cloth import SewnCloth
@@ -18,8 +18,11 @@ from warpflat.kernels.pierced import find_pierced
 
 __all__ = ["check_sewn", "pierced_edges"]
 
-# Cloth is tangled if more than this share of its edges pierce it elsewhere, or more than this share of it is stretched by so much.
-_PIERCED, _TORN = 0.1, (0.05, 0.5)
+# Cloth is tangled if more than this share of its edges pierce it elsewhere.
+_PIERCED = 0.1
+# A limb through cloth that is stretched by more than this share does not come free: of sixty sewn garments those that came to rest had up
+# to .93 there, those that did not 1 to 5. Beside the limbs sewn cloth may be stretched by 1.4, and come to rest at .06.
+_TAUT = 1.0
 _REMEDY = 'say in [[pieces]] where it is, as at = "front", and in top how high it hangs, or draw it where it is worn'
 
 
@@ -47,7 +50,7 @@ def check_sewn(
     *,
     buttoned: bool = False,
 ) -> None:
-    """Refuse cloth that was sewn beside a limb, or tangled.
+    """Refuse cloth that was sewn beside a limb, tangled, or drawn through a limb.
 
     Args:
         cloth: the sewn cloth.
@@ -78,20 +81,24 @@ def check_sewn(
                 f"{limb or 'body'} instead of around it: {_REMEDY}"
             )
     hit, edges = pierced_edges(cloth, positions)
-    corner, _, _, area = cloth.cells()
-    torn = stretches(cloth, positions) > _TORN[1]
-    pierced, share = float(hit.mean()), float(area[torn].sum() / area.sum())
-    if pierced > _PIERCED or share > _TORN[0]:
-        count = np.bincount(np.concatenate([edges[hit].ravel(), corner[torn].ravel()]), minlength=len(positions))
-        worst = max(
-            cloth.piece_vertices, key=lambda name: float(count[cloth.welded[cloth.piece_vertices[name]]].mean())
-        )
-        if pierced <= _PIERCED:
-            raise StepError(
-                f"piece {worst!r}: {100 * share:.0f} % of the garment would be stretched by over {100 * _TORN[1]:.0f} %, most of it there: "
-                f"it is too small for this body, or lies wrong: then {_REMEDY}"
-            )
+    pierced = float(hit.mean())
+    if pierced > _PIERCED:
         raise StepError(
-            f"the pieces were sewn into a tangle, most at {worst!r}: {100 * pierced:.0f} % of their edges pierce cloth, "
-            f"{100 * share:.0f} % of it is stretched by over {100 * _TORN[1]:.0f} %: {_REMEDY}"
+            f"the pieces were sewn into a tangle, most at {_worst_piece(cloth, edges[hit])!r}: {100 * pierced:.0f} % of their edges "
+            f"pierce cloth: {_REMEDY}"
         )
+    corner, _, _, _ = cloth.cells()
+    taut = corner[stretches(cloth, positions) > _TAUT]
+    for limb, line in lines.items():
+        through = crossings(line, positions[taut]).any(axis=0)
+        if through.any():
+            raise StepError(
+                f"piece {_worst_piece(cloth, taut[through])!r}: the {limb} would go through it where it is stretched by over "
+                f"{100 * _TAUT:.0f} %: it is too small for this body, or lies wrong: then {_REMEDY}"
+            )
+
+
+def _worst_piece(cloth: SewnCloth, vertices: IntArray) -> str:
+    """Return the piece with the largest share of vertices, each counted as often as it is given."""
+    count = np.bincount(vertices.ravel(), minlength=len(cloth.designed))
+    return max(cloth.piece_vertices, key=lambda name: float(count[cloth.welded[cloth.piece_vertices[name]]].mean()))

@@ -10,7 +10,7 @@ import numpy as np
 from warpflat.core import BoolArray, FloatArray, unit
 from warpflat.garment.mannequin.mannequin import Mannequin
 
-__all__ = ["limb_lines", "links", "on_arm"]
+__all__ = ["crossings", "limb_lines", "links", "on_arm"]
 
 # A limb goes on by so much [m] beyond its end, the face is so far above the neck, and an arm is nowhere thicker than this [m].
 _BEYOND, _FACE, _ARM = 3.0, 0.15, 0.09
@@ -31,30 +31,37 @@ def limb_lines(body: Mannequin) -> dict[str, FloatArray]:
     return found
 
 
+def crossings(line: FloatArray, triangles: FloatArray) -> FloatArray:
+    """Return how a polyline (#P by 3 [m]) goes through triangles (#T by 3 corners by 3 [m]); after Möller and Trumbore 1997.
+
+    Returns:
+        #P - 1 by #T: 1 where a segment leaves through the front, -1 through the back, 0 where it passes beside.
+    """
+    first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    normal = np.cross(first, second)
+    size = np.maximum(np.einsum("ij,ij->i", normal, normal), 1e-30)
+    found = []
+    for a, b in pairwise(line):
+        # Where the segment meets the plane of each triangle, in its coordinates.
+        det = normal @ (b - a)
+        det = np.where(np.abs(det) > 1e-15, det, np.inf)
+        t = np.einsum("ij,ij->i", normal, triangles[:, 0] - a) / det
+        place = a + t[:, None] * (b - a) - triangles[:, 0]
+        u = np.einsum("ij,ij->i", np.cross(place, second), normal) / size
+        v = np.einsum("ij,ij->i", np.cross(first, place), normal) / size
+        hit = (t >= 0.0) & (t < 1.0) & (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & np.isfinite(det)
+        found.append(np.where(hit, np.sign(det), 0.0))
+    return np.array(found)
+
+
 def links(loop: FloatArray, lines: Mapping[str, FloatArray]) -> dict[str, int]:
     """Return how often a closed loop (#L by 3 [m]) goes around each limb, less how often around the head.
 
     A limb and the head are one line from afar to afar. The number is that of its crossings with a fan that spans the loop, by direction:
     a winding number, whatever the fan.
     """
-    middle, ahead = loop.mean(axis=0), np.roll(loop, -1, axis=0)
-    normal = np.cross(loop - middle, ahead - middle)
-    through = {}
-    for limb, line in lines.items():
-        total = 0.0
-        for a, b in pairwise(line):
-            # Where the segment meets the plane of each triangle, in its coordinates (Möller and Trumbore 1997).
-            way = b - a
-            det = normal @ way
-            det = np.where(np.abs(det) > 1e-15, det, np.inf)
-            t = normal @ (middle - a) / det
-            place = a + t[:, None] * way - middle
-            size = np.maximum(np.einsum("ij,ij->i", normal, normal), 1e-30)
-            u = np.einsum("ij,ij->i", np.cross(place, ahead - middle), normal) / size
-            v = np.einsum("ij,ij->i", np.cross(loop - middle, place), normal) / size
-            hit = (t >= 0.0) & (t < 1.0) & (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & np.isfinite(det)
-            total += float(np.sign(det[hit]).sum())
-        through[limb] = round(total)
+    fan = np.stack([np.broadcast_to(loop.mean(axis=0), loop.shape), loop, np.roll(loop, -1, axis=0)], axis=1)
+    through = {limb: round(float(crossings(line, fan).sum())) for limb, line in lines.items()}
     return {limb: count - through["head"] for limb, count in through.items() if limb != "head"}
 
 

@@ -7,8 +7,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,21 +18,19 @@ from warpflat.garment.draping.result import Drape
 from warpflat.pattern import (
     LEAST_GAP,
     LEAST_PRESSURE,
-    PAGE_WIDTH,
     PIXELS_AROUND,
     SIDES,
     Body,
     Facets,
     Scale,
     Shot,
-    View,
     corner_mean,
-    draw_row,
     drawn_page,
     dress,
-    on_paper,
     outline_edges,
     view_from_side,
+    views_around,
+    write_maps,
     write_moving_picture,
 )
 
@@ -41,9 +39,8 @@ if TYPE_CHECKING:
 
 __all__ = ["write_compared_drapes", "write_correction_picture", "write_drape_film", "write_drape_picture"]
 
-_TALLEST, _TALLEST_COMPARED, _TOP, _MARGIN, _BAR, _GAP = 8.0, 4.2, 0.48, 0.3, 1.0, 0.2  # [in]
-# Of the film: pictures in a second, and their height [pixels].
-_RATE, _FILM_HEIGHT = 12, 420
+# Of the film: pictures in a second, their height [pixels], and the paper below them.
+_RATE, _FILM_HEIGHT, _PAPER = 12, 420, (249, 249, 249, 255)
 
 
 def write_drape_picture(path: str | os.PathLike[str], drape: Drape) -> None:
@@ -55,10 +52,9 @@ def write_drape_picture(path: str | os.PathLike[str], drape: Drape) -> None:
     worst = next((place.words for place in drape.places if place.kind != "bridged"), "it lies as designed")
     title = f"{drape.cloth.fabric.name}; {'' if drape.converged else 'NOT AT REST; '}{worst}"
     points, facets, skin = _dressed(drape)
-    views = {side: view_from_side(points, facets, degrees) for side, degrees in SIDES}
-    maps = {name: ([values] * len(views), scale) for name, ([values], scale) in _maps([drape]).items()}
+    maps = {name: (scale, [found] * len(SIDES)) for name, (scale, [found]) in _maps([drape], [skin]).items()}
     del maps[_PRESSURE]
-    _write_maps(path, title, views, [skin] * len(views), maps, _TALLEST)
+    write_maps(path, title, views_around(points, facets), maps, tallest=8.0)
 
 
 def write_compared_drapes(path: str | os.PathLike[str], drapes: Mapping[str, Drape]) -> None:
@@ -69,8 +65,8 @@ def write_compared_drapes(path: str | os.PathLike[str], drapes: Mapping[str, Dra
     """
     dressed = {name: _dressed(drape) for name, drape in drapes.items()}
     views = {name: view_from_side(points, facets, 0.0) for name, (points, facets, _) in dressed.items()}
-    skins = [skin for _, _, skin in dressed.values()]
-    _write_maps(path, "", views, skins, _maps(list(drapes.values())), _TALLEST_COMPARED)
+    maps = _maps(list(drapes.values()), [skin for _, _, skin in dressed.values()])
+    write_maps(path, "", views, maps, tallest=4.2)
 
 
 def write_drape_film(path: str | os.PathLike[str], drape: Drape) -> None:
@@ -87,47 +83,44 @@ def write_drape_film(path: str | os.PathLike[str], drape: Drape) -> None:
     # All frames show the same room, as high as the picture.
     shown = np.concatenate([everything, dressed[facets.used[facets.used >= count]]])
     per_metre = (_FILM_HEIGHT - 2 * PIXELS_AROUND) / float(np.ptp(shown[:, 1]))
-    rooms = dict[float, FloatArray]()
-    for _, degrees in SIDES:
-        rooms[degrees] = shown @ view_from_side(dressed, facets, degrees).directions.T
+    rooms = [shown @ view.directions.T for view in views_around(dressed, facets).values()]
     pictures = []
     for number in choose_frames(drape.frames):
         points = drape.frames[number].astype(np.float64)
         colours = np.concatenate([scale.rgb(corner_mean(drape.body.gaps(points), drape.cloth.faces)), skin])
-        sides = []
-        for degrees, room in rooms.items():
-            view = view_from_side(np.concatenate([points, dressed[count:]]), facets, degrees)
-            shot = Shot(view, per_metre, low=room.min(axis=0), size=np.ptp(room, axis=0))
-            sides.append(on_paper(shot.pixels(colours)))
-        pictures.append(Image.fromarray(np.concatenate(sides, axis=1)))
+        views = views_around(np.concatenate([points, dressed[count:]]), facets).values()
+        shots = [
+            Shot(view, per_metre, low=room.min(axis=0), size=np.ptp(room, axis=0))
+            for view, room in zip(views, rooms, strict=True)
+        ]
+        sides = Image.fromarray(np.concatenate([shot.pixels(colours) for shot in shots], axis=1))
+        pictures.append(Image.alpha_composite(Image.new("RGBA", sides.size, _PAPER), sides).convert("RGB"))
     write_moving_picture(path, pictures, each=1000 // _RATE, last=2000)
 
 
 _PRESSURE = "pressure [kPa]"
 
 
-def _maps(drapes: list[Drape]) -> dict[str, tuple[list[FloatArray], Scale]]:
-    """Return by title the values of each map, #F for each drape, and the scale that all of them share."""
-    areas = np.concatenate([drape.face_areas for drape in drapes])
-    limits = [drape.cloth.fabric for drape in drapes]
+def _maps(drapes: list[Drape], skins: list[FloatArray]) -> dict[str, tuple[Scale, list[FloatArray]]]:
+    """Return by title the scale that all drapes share for a map, and the colours of the faces of each, with those of the body."""
+    areas, limits = np.concatenate([drape.face_areas for drape in drapes]), [drape.cloth.fabric for drape in drapes]
 
     def stretched(drape: Drape) -> FloatArray:
         warp, weft = drape.strains["warp"], drape.strains["weft"]
         return np.asarray(100.0 * np.where(np.abs(warp) > np.abs(weft), warp, weft))
 
+    def coloured(values: list[FloatArray], ends: Callable[..., Scale], *bounds: float) -> Any:
+        scale = ends(np.concatenate(values), areas, *bounds)
+        return scale, [np.concatenate([scale.rgb(each), skin]) for each, skin in zip(values, skins, strict=True)]
+
     gaps = [1e3 * corner_mean(drape.gap, drape.cloth.faces) for drape in drapes]
-    strains = [stretched(drape) for drape in drapes]
-    shears = [drape.strains["shear"] for drape in drapes]
     pressures = [1e-3 * corner_mean(drape.pressure, drape.cloth.faces) for drape in drapes]
-    most, most_sheared = 100.0 * max(f.strain_limit for f in limits), max(f.shear_limit for f in limits)
+    strain, shear = 100.0 * max(f.strain_limit for f in limits), max(f.shear_limit for f in limits)
     return {
-        "gap to the body [mm]": (gaps, Scale.from_zero(np.concatenate(gaps), areas, LEAST_GAP)),
-        "strain of the more strained thread [%]": (
-            strains,
-            Scale.both_ways(np.concatenate(strains), areas, 0.5, most),
-        ),
-        "shear [degrees]": (shears, Scale.both_ways(np.concatenate(shears), areas, 0.5, most_sheared)),
-        _PRESSURE: (pressures, Scale.from_zero(np.concatenate(pressures), areas, 1e-3 * LEAST_PRESSURE)),
+        "gap to the body [mm]": coloured(gaps, Scale.from_zero, LEAST_GAP),
+        "strain of the more strained thread [%]": coloured([*map(stretched, drapes)], Scale.both_ways, 0.5, strain),
+        "shear [degrees]": coloured([drape.strains["shear"] for drape in drapes], Scale.both_ways, 0.5, shear),
+        _PRESSURE: coloured(pressures, Scale.from_zero, 1e-3 * LEAST_PRESSURE),
     }
 
 
@@ -137,34 +130,8 @@ def _dressed(drape: Drape, room: FloatArray | None = None) -> tuple[FloatArray, 
     return dress(body, drape.positions, drape.cloth.faces, room)
 
 
-def _write_maps(
-    path: str | os.PathLike[str],
-    title: str,
-    views: Mapping[str, View],
-    skins: list[FloatArray],
-    maps: Mapping[str, tuple[list[FloatArray], Scale]],
-    tallest: float,
-) -> None:
-    """Draw a row for each map: the views in its colours, the body in those of `skins`, and its scale."""
-    sizes = np.array([view.size[:2] for view in views.values()])
-    room = PAGE_WIDTH - _BAR - 2 * _MARGIN - _GAP * (len(views) - 1)
-    per_metre = min(room / float(sizes[:, 0].sum()), tallest / float(sizes[:, 1].max()))
-    tall = per_metre * float(sizes[:, 1].max())
-    aside = 0.5 * (room - per_metre * float(sizes[:, 0].sum()))
-    bottom = len(maps) * (tall + _TOP) + _MARGIN
-    with drawn_page(path, PAGE_WIDTH, bottom + (_MARGIN if title else 0.0)) as pen:
-        pen.write(_MARGIN, bottom + 0.1, title, 11)
-        for name, (values, scale) in maps.items():
-            pen.write(_MARGIN, bottom - 0.14, name, 11, fontweight="bold")
-            bottom -= tall + _TOP
-            colours = [np.concatenate([scale.rgb(each), skin]) for each, skin in zip(values, skins, strict=True)]
-            left = _MARGIN + aside
-            draw_row(pen, views, colours, left=left, bottom=bottom, inches_per_metre=per_metre, gap=_GAP)
-            pen.colour_bar(scale, PAGE_WIDTH - 0.75, bottom + 0.1 * tall, 0.16, 0.75 * tall)
-
-
-# Of a correction: room between pieces [m], inches per metre, the largest page [in], and colours before and after.
-_BETWEEN, _SCALE, _LARGEST, _BEFORE, _AFTER = 0.06, 8.0, 60.0, "#8a8a8a", "#c8452c"
+# Of a correction: room between pieces [m], inches per metre, margin and largest page [in], and colours before and after.
+_BETWEEN, _SCALE, _MARGIN, _LARGEST, _BEFORE, _AFTER = 0.06, 8.0, 0.3, 60.0, "#8a8a8a", "#c8452c"
 # Changes of the outline that are written beside it: the largest ones of a piece, so far apart [m].
 _LABELS, _APART, _LEAST = 6, 0.08, 1e-3
 

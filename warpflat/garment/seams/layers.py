@@ -117,7 +117,7 @@ def read_garment(
     total = sum(layer.area for layer in layers)
     surplus = surplus_layers(layers)
     notes += surplus.values()
-    kept, trifles, area = list[Surface](), len(order) - len(found) - len(faults), 0.0
+    kept, trifles, area = list[Surface](), len(order) - len(found) - len(bodies) - len(faults), 0.0
     for number, (surface, layer) in enumerate(zip(found, layers, strict=True)):
         if number in surplus:
             continue

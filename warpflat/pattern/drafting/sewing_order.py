@@ -343,10 +343,8 @@ class _Workshop(SewingTasks):
         waits = {task: sum(task in other.needs for other in self.tasks if other.seams) for task in self.tasks}
 
         # Seams that differ by less than a tenth of a millimetre are sewn in the pattern's order, whatever the rounding.
-        rank, before = {0.0: 0}, 0.0
-        for length in sorted(first for first, _ in self.lengths.values()):
-            rank[length] = rank[before] + (length - before > _ONE_LENGTH)
-            before = length
+        lengths = sorted({0.0, *(first for first, _ in self.lengths.values())})
+        rank = dict(zip(lengths, np.cumsum(np.diff(lengths, prepend=0.0) > _ONE_LENGTH).tolist(), strict=True))
 
         def key(task: Task) -> tuple[object, ...]:
             length = self.lengths.get(task.seams[0].name, (0.0, 0.0))[0] if task.seams else 0.0

@@ -10,12 +10,10 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Polygon
-from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 from PIL import Image
@@ -38,7 +36,6 @@ __all__ = [
     "drawn_page",
     "keep_words_on_page",
     "new_figure",
-    "on_paper",
     "picture_of",
     "write_figure",
     "write_moving_picture",
@@ -52,8 +49,7 @@ GREY = (0.36, 0.38, 0.42)
 GRAIN = (0.02, 0.27, 0.66)
 LABEL_SIZE = 7.5  # [pt]
 _HALO, _HALO_LAYER = (1.0, 1.0, 1.0, 0.7), 3.5  # below the outline
-_SEGMENTS_TO_A_PATH = 500
-_PAPER = 249
+_SEGMENTS_TO_A_LINE = 500
 # A page has so many pixels at most.
 _MOST_PIXELS = 2.4e7
 
@@ -78,7 +74,7 @@ def drawn_page(
     with all_letters():
         pen = Pen(width, height, dpi=dpi)
         yield pen
-        write_figure(path, pen.figure)
+    write_figure(path, pen.figure)
 
 
 def picture_of(figure: Figure) -> Image.Image:
@@ -90,12 +86,13 @@ def picture_of(figure: Figure) -> Image.Image:
 
 
 def write_figure(path: str | os.PathLike[str], figure: Figure) -> None:
-    """Write the pixels of a figure of :func:`new_figure` at its own resolution; atomically.
+    """Write the pixels of a figure of :func:`new_figure` at its own resolution, with all letters; atomically.
 
     Raises:
         InputError: the file cannot be written.
     """
-    image, metadata = picture_of(figure), PngInfo()
+    with all_letters():
+        image, metadata = picture_of(figure), PngInfo()
     metadata.add_text("Software", "warpflat")
     resolution = float(figure.dpi)
     with atomic_path(path) as temporary:
@@ -120,12 +117,6 @@ def write_moving_picture(
     durations = [*[each] * (len(pictures) - 1), last]
     with atomic_path(path) as temporary:
         pictures[0].save(temporary, format="WEBP", duration=durations, loop=0, quality=80, **more)
-
-
-def on_paper(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return RGBA pixels over light paper, RGB."""
-    cover = pixels[..., 3:] / 255.0
-    return np.round(_PAPER * (1.0 - cover) + pixels[..., :3] * cover).astype(np.uint8)
 
 
 def keep_words_on_page(figure: Any) -> None:
@@ -223,21 +214,16 @@ class Pen:
 
     def line(self, points: FloatArray, *, width: float, colour: Any = INK, halo: bool = False, **look: Any) -> None:
         """Draw a polyline (#N by 2); with a halo it stays visible on dark colours. The look is that of Matplotlib's lines."""
-        x, y = points.T
         if halo:
-            self.axes.add_artist(Line2D(x, y, color=_HALO, linewidth=width + 1.6, zorder=_HALO_LAYER))
-        self.axes.add_artist(Line2D(x, y, color=colour, linewidth=width, zorder=5, **look))
+            self.axes.add_artist(Line2D(*points.T, color=_HALO, linewidth=width + 1.6, zorder=_HALO_LAYER))
+        self.axes.add_artist(Line2D(*points.T, color=colour, linewidth=width, **{"zorder": 5} | look))
 
-    def segments(
-        self, ends: FloatArray, *, width: float, colour: Any = INK, halo: bool = False, zorder: float = 5
-    ) -> None:
-        """Draw straight segments (#S by 2 by 2), many to a path: a path each takes longer to set up than all of them to draw."""
-        parts = [ends[i : i + _SEGMENTS_TO_A_PATH] for i in range(0, len(ends), _SEGMENTS_TO_A_PATH)]
-        paths = [Path(part.reshape(-1, 2), np.tile([Path.MOVETO, Path.LINETO], len(part))) for part in parts]
-        layers = [(_HALO, width + 1.6, _HALO_LAYER)] if halo else []
-        for ink, thickness, layer in (*layers, (colour, width, zorder)):
-            look: dict[str, Any] = {"edgecolors": [ink], "linewidths": thickness, "capstyle": "round", "zorder": layer}
-            self.axes.add_collection(PathCollection(paths, facecolors="none", **look), autolim=False)
+    def segments(self, ends: FloatArray, **look: Any) -> None:
+        """Draw straight segments (#S by 2 by 2) as lines with gaps, many to a line: a line each takes longer than all that is drawn."""
+        broken = np.pad(ends, ((0, 0), (0, 1), (0, 0)), constant_values=np.nan)
+        for first in range(0, len(ends), _SEGMENTS_TO_A_LINE):
+            part = broken[first : first + _SEGMENTS_TO_A_LINE].reshape(-1, 2)
+            self.line(part, **{"solid_capstyle": "round"} | look)
 
     def polygon(self, points: FloatArray, **look: Any) -> None:
         """Draw a closed outline (#N by 2); the look is that of Matplotlib's patches."""

@@ -13,7 +13,7 @@ from warpflat.flat import join_surfaces
 from warpflat.pattern.export.colours import Scale, energy_scale
 from warpflat.pattern.export.figure import GREY, INK, PAGE_WIDTH, drawn_page
 from warpflat.pattern.export.geometry import polylines_of
-from warpflat.pattern.export.views import draw_row, make_facets, surface_view, view_from_side
+from warpflat.pattern.export.views import SIDES, draw_row, make_facets, row_size, surface_view, views_around
 
 if TYPE_CHECKING:
     from warpflat.flat import Ledger, LedgerEntry
@@ -53,14 +53,10 @@ def write_ledger_picture(path: str | os.PathLike[str], ledger: Ledger) -> None:
     facets = make_facets(surface.faces)
     views = {"": surface_view(surface, facets, polylines_of({}))}
     if len(ledger.pieces) > 1:  # around a body
-        views = {
-            "front": view_from_side(surface.vertices, facets, 0.0),
-            "back": view_from_side(surface.vertices, facets, 180.0),
-        }
-    sizes = np.array([view.size[:2] for view in views.values()])
-    per_metre = min((_BODY - _GAP * (len(views) - 1)) / float(sizes[:, 0].sum()), 5.2 / float(sizes[:, 1].max()))
-    tall = max(float(sizes[:, 1].max()) * per_metre + 0.7, _ROW * (len(entries) + 2))
-    height = tall + 1.15
+        views = views_around(surface.vertices, facets, (SIDES[0], SIDES[-1]))
+    wide, high = row_size(views)
+    per_metre = min((_BODY - _GAP * (len(views) - 1)) / wide, 5.2 / high)
+    height = max(high * per_metre + 0.7, _ROW * (len(entries) + 2)) + 1.15
     with drawn_page(path, PAGE_WIDTH, height) as pen:
         pen.write(0.45, height - 0.35, f"{ledger.name}: where to cut", 15, fontweight="bold")
         peak = ledger.peaks[0] if ledger.peaks else "none inside"
@@ -69,7 +65,7 @@ def write_ledger_picture(path: str | os.PathLike[str], ledger: Ledger) -> None:
         pen.write(0.45, height - 0.64, f"{stored}; highest density: {peak}", 9.5, color=GREY)
         areas = np.concatenate([piece.worn.area for piece in ledger.pieces])
         colours = Scale(high=energy_scale(density, areas)).rgb(density)
-        bottom = height - 1.15 - float(sizes[:, 1].max()) * per_metre
+        bottom = height - 1.15 - high * per_metre
         shown = draw_row(
             pen, views, [colours] * len(views), left=0.45, bottom=bottom, inches_per_metre=per_metre, gap=_GAP
         )

@@ -9,14 +9,15 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
-from warpflat.core import FloatArray, IntArray
+from warpflat.core import FloatArray, IntArray, report_activity
 from warpflat.flat import Surface, join_surfaces
 from warpflat.pattern.drafting.placement import LabelRoom, Spot
 from warpflat.pattern.drafting.polygons import rotation
 from warpflat.pattern.export.colours import DRAFTED_CLOTH, SMALLEST_SCALE, Scale, energy_scale
 from warpflat.pattern.export.dressed import Body, dress
-from warpflat.pattern.export.figure import GRAIN, GREY, INK, LABEL_SIZE, MARGIN, PAGE_WIDTH, Pen, drawn_page
+from warpflat.pattern.export.figure import GRAIN, GREY, INK, LABEL_SIZE, MARGIN, PAGE_WIDTH, Pen, write_figure
 from warpflat.pattern.export.geometry import face_areas, polylines_of
 from warpflat.pattern.export.labels import draw_lines
 from warpflat.pattern.export.letters import all_letters, is_drawn, titles
@@ -28,8 +29,9 @@ from warpflat.pattern.export.views import (
     draw_row,
     make_facets,
     pattern_view,
+    row_size,
     surface_view,
-    view_from_side,
+    views_around,
 )
 
 __all__ = ["DraftedOutline", "PicturePiece", "draw_figure", "write_picture"]
@@ -106,7 +108,6 @@ def write_picture(
     path: str | os.PathLike[str],
     pieces: Sequence[PicturePiece],
     *,
-    quantity: str = "strain energy density",
     scale: float | None = None,
     body: Body | None = None,
     drafted: Sequence[DraftedOutline] = (),
@@ -116,57 +117,42 @@ def write_picture(
     Args:
         path: the file, ``*.png``.
         pieces: what is drawn.
-        quantity: what the colours show, written beside the colour bar.
+        scale: upper end of the colours [J/m2]; if not given, 98 % of the area of all pieces lies below it.
         body: on which all pieces are shown together first, from the front, the side and the back. If not given, each piece is
             shown in space beside its pattern.
-        scale: upper end of the colours [J/m2]; if not given, 98 % of the area of all pieces lies below it.
         drafted: pieces without a surface, as collars and waistbands: grey on the body, and their outlines below the others.
 
     Raises:
         InputError: the file cannot be written.
         ValueError: there is no piece.
     """
-    with drawn_page(path) as pen:
-        _draw(pen, pieces, quantity, scale, body, drafted)
+    report_activity(f"drawing {os.path.basename(path)}")
+    write_figure(path, draw_figure(pieces, scale=scale, body=body, drafted=drafted))
 
 
+@all_letters()
 def draw_figure(
     pieces: Sequence[PicturePiece],
     *,
-    quantity: str = "strain energy density",
     scale: float | None = None,
     body: Body | None = None,
     drafted: Sequence[DraftedOutline] = (),
-) -> Any:
-    """Return the Matplotlib figure that :func:`write_picture` saves; see there for the arguments.
+) -> Figure:
+    """Return the Matplotlib figure that :func:`write_picture` saves, of the size that it needs; see there for the arguments.
 
     Raises:
         ValueError: there is no piece.
     """
-    with all_letters():
-        pen = Pen(PAGE_WIDTH, 4.0)
-        _draw(pen, pieces, quantity, scale, body, drafted)
-    return pen.figure
-
-
-def _draw(
-    pen: Pen,
-    pieces: Sequence[PicturePiece],
-    quantity: str,
-    highest: float | None,
-    body: Body | None,
-    drafted: Sequence[DraftedOutline],
-) -> None:
-    """Draw all on a page, which gets the size that it needs."""
     if not pieces:
         raise ValueError("a picture needs at least one piece")
     names = titles([piece.name for piece in pieces], is_drawn)
     density = np.concatenate([np.asarray(piece.face_energy_density, dtype=np.float64) for piece in pieces])
     areas = np.concatenate([face_areas(piece.surface.vertices, piece.surface.faces) for piece in pieces])
-    scale = Scale(high=energy_scale(density, areas) if highest is None else highest)
-    cells = [_cell(piece, names[piece.name], scale, shows_body=body is None) for piece in pieces]
+    colours = Scale(high=energy_scale(density, areas) if scale is None else scale)
+    cells = [_cell(piece, names[piece.name], colours, shows_body=body is None) for piece in pieces]
     if len(cells) == 1 and body is None:
         cells[0].narrowest = _NARROWEST_PAGE - 2 * MARGIN
+    pen = Pen(PAGE_WIDTH, 4.0)
     # The first caption that is the same in all cells stands left of the colour bar, if there is room for it.
     shared = ""
     for key, value in list(cells[0].captions.items()) if len(cells) > 1 else ():
@@ -177,31 +163,30 @@ def _draw(
                 del cell.captions[key]
             shared = caption
             break
-    band = None if body is None else _Band(body, pieces, drafted, scale)
+    band = None if body is None else _Band(body, pieces, drafted, colours)
     width, height, page_scale = _lay_out(pen, cells, band)
-    rows = _DraftedRows(pen, drafted, width - 2 * MARGIN, page_scale) if drafted else None
-    pen.resize(width, height + _STRIP + (0.0 if rows is None else rows.height))
+    foot = _draw_drafted(pen, drafted, width - 2 * MARGIN, page_scale) if drafted else 0.0
+    pen.resize(width, height + _STRIP + foot)
     pen.scale_bar(MARGIN, pen.height - 0.27, page_scale)
     pen.write(MARGIN, pen.height - 0.48, shared, LABEL_SIZE, color=GREY)
-    _draw_colours(pen, scale, density, areas, quantity)
+    _draw_colours(pen, colours, density, areas)
     top = pen.height - _STRIP
     if band is not None:
         band.draw(pen, MARGIN, top)
     for cell in cells:
         _draw_cell(pen, cell, top, page_scale)
-    if rows is not None:
-        rows.draw(pen, MARGIN, rows.height)
+    return pen.figure
 
 
-def _draw_colours(pen: Pen, scale: Scale, density: FloatArray, areas: FloatArray, quantity: str) -> None:
+def _draw_colours(pen: Pen, scale: Scale, density: FloatArray, areas: FloatArray) -> None:
     """Draw the scale of the colours up to the right margin, and the share of the area above its end; words if there is no strain."""
     left, top, above = MARGIN + _SCALE_BAR, pen.height - 0.24, density > scale.high
     if scale.high <= SMALLEST_SCALE and not above.any():
-        words = f"{quantity}: none, the cloth lies flat without strain"
+        words = "strain energy density: none, the cloth lies flat without strain"
         pen.write(left, top, pen.shorten(words, _WORDS_SIZE, pen.width - left - MARGIN), _WORDS_SIZE)
         return
     right = pen.width - (_NOTE if above.any() else _PLAIN)
-    words = pen.shorten(f"{quantity} [J/m²]", _WORDS_SIZE, right - left - 0.15 - _SHORTEST_BAR)
+    words = pen.shorten("strain energy density [J/m²]", _WORDS_SIZE, right - left - 0.15 - _SHORTEST_BAR)
     pen.write(left, top, words, _WORDS_SIZE)
     left += pen.measure(words, _WORDS_SIZE)[0] + 0.15
     extend = "max" if above.any() else "neither"
@@ -333,7 +318,7 @@ class _Band:
         flattened, others = [piece.surface for piece in pieces], [surface for each in drafted for surface in each.worn]
         worn = join_surfaces([*flattened, *others])
         points, facets, skin = dress(body, worn.vertices, worn.faces)
-        self._views = {title: view_from_side(points, facets, degrees) for title, degrees in SIDES}
+        self._views = views_around(points, facets)
         for view in self._views.values():
             cloth = view.points[: len(worn.vertices), 2]
             cloth += _NEARER
@@ -345,8 +330,7 @@ class _Band:
         within = dict.fromkeys(each.name.partition(", ")[0] for each in drafted if not each.worn)
         words = ["grey: drafted for its edges, laid by its seams"] if others else []
         self._words = "; ".join([*words, *([f"not shown on the body: {', '.join(within)}"] if within else [])])
-        self._width = sum(float(view.size[0]) for view in self._views.values())
-        self._tallest = max(float(view.size[1]) for view in self._views.values())
+        self._width, self._tallest = row_size(self._views)
         self.area = sum(view.area for view in self._views.values())
         self._gaps = len(SIDES) * _BAND_GAP
         self.largest_scale = min((_ROOM - self._gaps) / self._width, _BAND_TALLEST / self._tallest)
@@ -540,40 +524,29 @@ def _grain_inside(
     return None
 
 
-class _DraftedRows:
-    """Drafted outlines in rows, longer side across.
+def _draw_drafted(pen: Pen, pieces: Sequence[DraftedOutline], width: float, page_scale: float) -> float:
+    """Draw drafted outlines in rows at the foot of a page, longer side across; return how high they reach [in].
 
-    Attributes:
-        height: of all rows [in].
+    Where the longest does not fit into the width [in] at the page's scale [in/m], all are drawn smaller.
     """
-
-    def __init__(self, pen: Pen, pieces: Sequence[DraftedOutline], width: float, page_scale: float) -> None:
-        """Lay the pieces out in a width [in]; where the longest does not fit at the page's scale [in/m], all are drawn smaller."""
-        outlines = []
-        for piece in pieces:
-            wide, high = np.ptp(piece.points, axis=0)
-            points = piece.points if wide >= high else np.column_stack([piece.points[:, 1], -piece.points[:, 0]])
-            outlines.append(points - [points[:, 0].min(), points[:, 1].max()])
-        self._scale = min(page_scale, (width - _GAP) / max(float(np.ptp(points[:, 0])) for points in outlines))
-        self._is_smaller = self._scale < page_scale * (1.0 - 1e-9)
-        self._names = [piece.name for piece in pieces]
-        self._outlines = [self._scale * points for points in outlines]
-        sizes = list[tuple[float, float]]()
-        for name, points in zip(self._names, self._outlines, strict=True):
-            wide, high = np.ptp(points, axis=0).tolist()
-            # A name that is wider than the page is shortened where it is written.
-            sizes.append((min(max(wide, pen.measure(name, _NAME_SIZE)[0]) + _GAP, width), high + _NAME + _GAP))
-        self._places, _, tall = pack_rows(sizes, width)
-        self.height = tall + _ROWS_HEADING
-
-    def draw(self, pen: Pen, left: float, top: float) -> None:
-        """Draw the rows with their upper left corner at (`left`, `top`) [in]."""
-        heading = "drafted for the edges that they are sewn to"
-        pen.write(left, top - 0.14, heading, _WORDS_SIZE, color=GREY, fontstyle="italic")
-        if self._is_smaller:
-            pen.scale_bar(left + pen.measure(heading, _WORDS_SIZE)[0] + 0.25, top - 0.17, self._scale)
-        for name, points, (across, down) in zip(self._names, self._outlines, self._places, strict=True):
-            y = top - _ROWS_HEADING - down
-            pen.write(left + across, y - 0.5 * _NAME, name, _NAME_SIZE)
-            corner = np.array([left + across, y - _NAME])
-            pen.polygon(corner + points, facecolor=_CLOTH, edgecolor=INK, linewidth=0.8, zorder=3)
+    outlines = []
+    for piece in pieces:
+        wide, high = np.ptp(piece.points, axis=0)
+        points = piece.points if wide >= high else np.column_stack([piece.points[:, 1], -piece.points[:, 0]])
+        outlines.append(points - [points[:, 0].min(), points[:, 1].max()])
+    scale = min(page_scale, (width - _GAP) / max(float(np.ptp(points[:, 0])) for points in outlines))
+    sizes = list[tuple[float, float]]()
+    for piece, points in zip(pieces, outlines, strict=True):
+        wide, high = (scale * np.ptp(points, axis=0)).tolist()
+        # A name that is wider than the page is shortened where it is written.
+        sizes.append((min(max(wide, pen.measure(piece.name, _NAME_SIZE)[0]) + _GAP, width), high + _NAME + _GAP))
+    places, _, tall = pack_rows(sizes, width)
+    heading, top = "drafted for the edges that they are sewn to", tall + _ROWS_HEADING
+    pen.write(MARGIN, top - 0.14, heading, _WORDS_SIZE, color=GREY, fontstyle="italic")
+    if scale < page_scale * (1.0 - 1e-9):
+        pen.scale_bar(MARGIN + pen.measure(heading, _WORDS_SIZE)[0] + 0.25, top - 0.17, scale)
+    for piece, points, (across, down) in zip(pieces, outlines, places, strict=True):
+        pen.write(MARGIN + across, tall - down - 0.5 * _NAME, piece.name, _NAME_SIZE)
+        corner = np.array([MARGIN + across, tall - down - _NAME])
+        pen.polygon(corner + scale * points, facecolor=_CLOTH, edgecolor=INK, linewidth=0.8, zorder=3)
+    return top

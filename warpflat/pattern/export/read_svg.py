@@ -380,28 +380,24 @@ def _viewport(element: ET.Element) -> FloatArray:
 
 
 def _transform(text: str) -> FloatArray:
-    found = np.eye(2, 3)
+    """Return the matrix of a `transform`; the first of its functions is applied last."""
+    from fontTools.misc.transform import Transform  # type: ignore[import-untyped]
+
+    found = Transform()
     for name, values in _TRANSFORM.findall(text):
         v = [float(word) for word in values.replace(",", " ").split()]
         if name == "matrix":
-            one = np.array([[v[0], v[2], v[4]], [v[1], v[3], v[5]]])
-        elif name == "translate":
-            one = np.array([[1.0, 0.0, v[0]], [0.0, 1.0, v[1] if len(v) > 1 else 0.0]])
-        elif name == "scale":
-            one = np.array([[v[0], 0.0, 0.0], [0.0, v[-1], 0.0]])
+            found = found.transform(tuple(v[:6]))
+        elif name in ("translate", "scale"):
+            found = getattr(found, name)(v[0], *v[1:2])
         elif name == "rotate":
-            c, s = np.cos(np.radians(v[0])), np.sin(np.radians(v[0]))
             x, y = v[1:3] if len(v) == 3 else (0.0, 0.0)
-            one = np.array([[c, -s, x - c * x + s * y], [s, c, y - s * x - c * y]])
+            found = found.translate(x, y).rotate(np.radians(v[0])).translate(-x, -y)
         elif name in ("skewX", "skewY"):
-            slope = float(np.tan(np.radians(v[0])))
-            one = np.array(
-                [[1.0, slope, 0.0], [0.0, 1.0, 0.0]] if name == "skewX" else [[1.0, 0.0, 0.0], [slope, 1.0, 0.0]]
-            )
+            found = found.skew(**{name[-1].lower(): np.radians(v[0])})
         else:
             raise ValueError(f"transform {name}")
-        found = _times(found, one)
-    return found
+    return np.array(found, dtype=np.float64).reshape(3, 2).T
 
 
 def _times(a: FloatArray, b: FloatArray) -> FloatArray:

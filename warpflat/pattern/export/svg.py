@@ -52,7 +52,6 @@ def write_svg(
     *,
     sizes: Sequence[str] | None = None,
     nested: bool = False,
-    width: float = 1.5,
 ) -> None:
     """Write the pieces side by side, in true size.
 
@@ -66,12 +65,11 @@ def write_svg(
         sizes: those to draw; None draws all.
         nested: lay all sizes of a piece upon each other, as a grading nest; of several sizes the sewing lines are not
             displayed.
-        width: of the sheet [m].
     """
     groups = nests(garment, sizes)
     if not nested:
         groups = [(piece,) for size in garment.pieces for nest in groups for piece in nest if piece.size == size]
-    sheet = lay_out(groups, width=width)
+    sheet = lay_out(groups)
     page = SvgPage(float(sheet.size[0]), float(sheet.size[1]), garment.name)
     seams = seam_words(garment.garment.seams)
     for placed in sheet.placed:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -12,7 +13,8 @@ from numpy.typing import NDArray
 
 from warpflat.core import BoolArray, FloatArray, IntArray, unit
 from warpflat.flat import Surface, area_vectors, mean_normals, mesh_edges, triangulate
-from warpflat.pattern.export.figure import GREY, INK, Pen, Pixels
+from warpflat.pattern.export.colours import Scale
+from warpflat.pattern.export.figure import GREY, INK, PAGE_WIDTH, Pen, Pixels, drawn_page
 from warpflat.pattern.export.geometry import outline_edges
 from warpflat.pattern.export.raster import Samples, rasterise, shade
 
@@ -26,8 +28,11 @@ __all__ = [
     "draw_row",
     "make_facets",
     "pattern_view",
+    "row_size",
     "surface_view",
     "view_from_side",
+    "views_around",
+    "write_maps",
 ]
 
 #: From where a worn garment or a body is shown, with degrees for :func:`view_from_side`.
@@ -36,6 +41,8 @@ SIDES = (("front", 0.0), ("left side", 90.0), ("back", 180.0))
 _FINE = 500_000  # triangles, about as many as pixels
 PIXELS_AROUND = 3  # the image of a mesh
 _COARSE = 120  # pixels across a view, enough to tell its area
+# A page of maps: above each row, around all of them, beside them for the scale, and between views [in].
+_ABOVE, _AROUND, _BAR, _GAP = 0.48, 0.3, 1.0, 0.2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -143,6 +150,11 @@ def view_from_side(points: FloatArray, facets: Facets, degrees: float) -> View:
     """Return a mesh (#V by 3) as seen by somebody who walked `degrees` around it to its left."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return _seen(points, facets, np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]), {})
+
+
+def views_around(points: FloatArray, facets: Facets, sides: Iterable[tuple[str, float]] = SIDES) -> dict[str, View]:
+    """Return a mesh (#V by 3) as seen from some sides, by their titles (see :func:`view_from_side`)."""
+    return {title: view_from_side(points, facets, degrees) for title, degrees in sides}
 
 
 def _seen(points: FloatArray, facets: Facets, directions: FloatArray, lines: Mapping[str, list[IntArray]]) -> View:
@@ -286,6 +298,12 @@ class DrawnView:
         return points[begins[longest] : ends[longest]]
 
 
+def row_size(views: Mapping[str, View]) -> tuple[float, float]:
+    """Return width and height of views side by side on one floor, without gaps [m]."""
+    wide, high, _ = np.array([view.size for view in views.values()]).T
+    return float(wide.sum()), float(high.max())
+
+
 def draw_row(
     pen: Pen,
     views: Mapping[str, View],
@@ -316,3 +334,37 @@ def draw_row(
         pen.write(0.5 * (start + end), top + above, title, 9, color=GREY, ha="center", fontstyle="italic")
         left = end + gap
     return drawn
+
+
+def write_maps(
+    path: str | os.PathLike[str],
+    title: str,
+    views: Mapping[str, View],
+    maps: Mapping[str, tuple[Scale, Sequence[FloatArray]]],
+    *,
+    tallest: float,
+) -> None:
+    """Draw a row for each map: its name, the views in its colours, and its scale; atomically.
+
+    Args:
+        path: the file, ``*.png``.
+        title: of the page; none if it is empty.
+        views: by title.
+        maps: by name, the scale, and the colours of the faces of each view (#F by 3, sRGB).
+        tallest: greatest height of a view [in].
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    (wide, high), gaps = row_size(views), _GAP * (len(views) - 1)
+    room = PAGE_WIDTH - _BAR - 2 * _AROUND - gaps
+    per_metre = min(room / wide, tallest / high)
+    left, tall = _AROUND + 0.5 * (room - per_metre * wide), per_metre * high
+    bottom = len(maps) * (tall + _ABOVE) + _AROUND
+    with drawn_page(path, PAGE_WIDTH, bottom + (_AROUND if title else 0.0)) as pen:
+        pen.write(_AROUND, bottom + 0.1, title, 11)
+        for name, (scale, colours) in maps.items():
+            pen.write(_AROUND, bottom - 0.14, name, 11, fontweight="bold")
+            bottom -= tall + _ABOVE
+            draw_row(pen, views, colours, left=left, bottom=bottom, inches_per_metre=per_metre, gap=_GAP)
+            pen.colour_bar(scale, PAGE_WIDTH - 0.75, bottom + 0.1 * tall, 0.16, 0.75 * tall)

@@ -10,24 +10,22 @@ import json
 import re
 import struct
 import sys
-from importlib.util import find_spec
 from random import Random
 from typing import Any
 
 import click
 
-from . import seeds, studio_messages
-from .composed_files import COMPOSED_SHARES, composed_case
-from .foreign_files import FOREIGN_SHARES, foreign_case
-from .geometry import GEOMETRY_SHARES, geometry_case
-from .promise import Case
+from .seeds import COMMANDS
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
-__all__ = ["SHARES", "WORDS", "random_case", "toml_text"]
+__all__ = [
+    "DEEP", "DIGITS", "NAMES", "WORDS", "damaged_bytes", "damaged_json", "damaged_structure", "damaged_toml", "little_work",
+    "odd_arguments", "toml_text",
+]  # fmt: skip
 
 DIGITS, DEEP = "9" * 5000, "@deep@"
 """An integer longer than Python converts; and what stands for lists in lists, deeper than Python recurses."""
@@ -45,6 +43,11 @@ _MUCH_WORK = re.compile(rb"(resolution\W+)\d{3,7}(?!\d)")
 """What asks for so many vertices, rightly, that it takes minutes."""
 _FLOATS = (float("nan"), float("inf"), -1.0, 1e38, 1e-40, 0.0, 1e9)
 _INTEGERS = (0, -1, 1, 255, 2**16, 2**31 - 1, -(2**31), 10**6, 10**9)
+
+
+def little_work(content: bytes) -> bytes:
+    """A scene that asks for few vertices only."""
+    return _MUCH_WORK.sub(rb"\g<1>5", content)
 
 
 def _patch(random: Random, data: bytes) -> bytes:
@@ -258,7 +261,7 @@ def _options() -> dict[str, list[tuple[str, bool]]]:
 
 def odd_arguments(random: Random) -> list[str]:
     """A command line with odd values, missing, doubled or added options."""
-    arguments = list(random.choice(seeds.COMMANDS))
+    arguments = list(random.choice(COMMANDS))
     options = _options()[arguments[0]]
     # No shell passes NUL. What begins with a slash is somebody's folder.
     words = [word.replace("\x00", "") for word in WORDS] + [
@@ -286,50 +289,3 @@ def odd_arguments(random: Random) -> list[str]:
             arguments[at] = random.choice(words)
         arguments = arguments or ["--help"]
     return arguments
-
-
-def random_case(kind: str, random: Random) -> Case:
-    """A damaged seed of a kind, and the command that reads it."""
-    if kind == "studio":
-        return studio_messages.random_attack(random)
-    if kind in GEOMETRY_SHARES:
-        return geometry_case(kind, random)
-    if kind in ("batch", "result", "folder"):
-        from .folders import random_folder
-
-        return random_folder(kind, random)
-    if kind in COMPOSED_SHARES:
-        return composed_case(kind, random)
-    if kind in FOREIGN_SHARES:
-        return foreign_case(kind, random)
-    if kind == "arguments":
-        content = json.dumps(odd_arguments(random)).encode()
-    elif kind == "scene":
-        slow = random.randrange(20) == 19
-        content = damaged_toml(random, seeds.FORM_SCENE if slow else random.choice(list(seeds.SCENES.values())))
-        content = _MUCH_WORK.sub(rb"\g<1>5", content)
-    elif kind == "fabric":
-        content = damaged_toml(random, seeds.FABRIC)
-    elif kind == "pattern":
-        content = damaged_json(random, seeds.pattern())
-    elif kind == "metrics":
-        content = damaged_json(random, seeds.METRICS)
-    elif kind == "scan":
-        content = damaged_bytes(random, random.choice(seeds.bodies()))
-    elif kind in ("fit", "sewn"):
-        content = damaged_bytes(random, seeds.SKIRT if kind == "fit" else seeds.SEWN)
-    elif kind == "gltf" and random.randrange(2):
-        content = damaged_json(random, json.loads(seeds.meshes("gltf")[0]))
-    else:
-        content = damaged_bytes(random, random.choice(seeds.meshes(kind)))
-    return random.choice(seeds.case_of_file(kind, content))
-
-
-SHARES = {
-    "obj": 9, "ply": 10, "stl": 6, "off": 7, "glb": 6, "gltf": 6, "usda": 6, "usdc": 7, "usdz": 3, "scene": 12, "fabric": 9, "pattern": 11,
-    "metrics": 4, "scan": 1, "fit": 4, "sewn": 4, "arguments": 12, "batch": 6, "result": 4, "folder": 6,
-    **GEOMETRY_SHARES, **FOREIGN_SHARES, **COMPOSED_SHARES,
-}  # fmt: skip
-"""How many of a hundred cases, or so, are of which kind: few where one takes seconds."""
-if find_spec("viser") is not None:  # the extra `studio`
-    SHARES["studio"] = 10
