@@ -67,6 +67,8 @@ def test_sides_of_other_vertices_are_sewn_by_arc_length(alone: Flattening):
     before = abs(lengths(alone, "front") - lengths(alone, "back"))
     assert before > 5e-4, "there is something to sew"
     sewn = sew_pieces([alone], seams=[UNDERARM])
+    # Of another size, too, it is told what lies over itself.
+    assert sewn.summary()["pieces"]["sleeve"]["overlap_m2"] == sewn.pieces["sleeve"].overlap
     assert sewn.sewn is not None
     assert sewn.sewn.converged
     (seam,) = sewn.seams

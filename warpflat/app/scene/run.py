@@ -182,11 +182,12 @@ def _run(
 
         files = list(film.files)
         draped: dict[str, Any] = {}
+        drape_notes: tuple[str, ...] = ()
         if settings.drape is not None:
             measured, fit_notes, remedies, worn = fit.result()
             garment = garment.advised(lambda part: part.with_remedies(remedies[part.surface.name]))
             with optional_step("it was not draped", of=StepError):
-                draped, drape_files = write_drape(scene, garment, folder, device=device)
+                draped, drape_files, drape_notes = write_drape(scene, garment, folder, device=device)
                 files = list(dict.fromkeys([*drape_files, *files]))
                 sizes[plan.size] = replace(sizes[plan.size], drape=draped["drape"])
         # What is ready is packed for the review while other processes write.
@@ -224,7 +225,7 @@ def _run(
     return SceneResult(
         metrics=metrics,
         files=tuple(files),
-        notes=(*notes, *fit_notes, *written.notes, *name_notes, *manifest_notes),
+        notes=tuple(dict.fromkeys((*notes, *fit_notes, *written.notes, *drape_notes, *name_notes, *manifest_notes))),
         size=size,
     )
 

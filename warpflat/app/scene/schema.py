@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from warpflat.garment import DrapeOptions
 
 __all__ = [
+    "PATH_KEYS",
     "AutoCutTable",
     "BorderTable",
     "ClothTable",
@@ -465,6 +466,11 @@ else:
     RelaxTable = create_model("RelaxTable", __base__=Table, **_RELAX_FIELDS)
 
 
+#: Keys of a scene under which files are named, from table to table; some have other values, too.
+PATH_KEYS = (
+    ("start",), ("fabric_files",), ("surface", "file"), ("mannequin", "scan"), ("seams", "body"), ("find_seams", "body"),
+    ("seams_cut", "edges"),
+)  # fmt: skip
 # Keys of a scene that change the pattern of a mesh.
 _CHANGES_PATTERN = (
     "lines", "cuts", "auto_cut", "pieces", "seams", "find_seams", "seams_cut", "constraints", "datum", "start", "grain_angle", "bands",

@@ -7,6 +7,7 @@ from html import escape
 from typing import Any
 from urllib.parse import quote
 
+from warpflat.app.scene.load import scene_library
 from warpflat.app.studio.maps import MAPS, MapScale
 from warpflat.app.studio.save import Saved
 from warpflat.app.studio.session import Preview, Session
@@ -62,7 +63,7 @@ class Panel:
         scene = session.scene
         with self._gui.add_folder("Cloth"):
             try:
-                names = sorted(load_library([scene.folder / file for file in scene.settings.fabric_files]))
+                names = sorted(scene_library(scene))
             except InputError:
                 names = sorted(load_library())
             self._fabric = self._gui.add_dropdown("cloth", (_OWN, *names), initial_value=_OWN)

@@ -198,11 +198,12 @@ class Garment:
         return found if self.drape is None else {**found, "drape": self.drape}
 
     def summary(self) -> dict[str, Any]:
-        """Return the entry of another size in `metrics.json`: convergence, flips, stages and seams."""
+        """Return the entry of another size in `metrics.json`: convergence, flips, overlap, stages and seams."""
         pieces = {
             name: {
                 "converged": piece.converged,
                 "flipped_faces": piece.flipped_faces,
+                "overlap_m2": piece.overlap,
                 "stages": [stage.as_dict() for stage in piece.stages],
             }
             for name, piece in self.pieces.items()
