@@ -79,7 +79,7 @@ from warpflat.pattern import (
 
 if TYPE_CHECKING:
     from warpflat.flat import Crack, Flattening, Surface
-    from warpflat.garment.construction.border_seams import SeamTable
+    from warpflat.garment.construction.details import SeamTable
     from warpflat.garment.construction.garment import Garment
     from warpflat.garment.construction.openings import OpeningPart
     from warpflat.garment.construction.sewn import Stitching
