@@ -18,7 +18,8 @@ from warpflat.flat.solver.options import RelaxOptions
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.paths.lines import with_lines
 from warpflat.flat.surface.shapes import make_shape
-from warpflat.garment.construction.border_seams import SeamTable, surface_seams
+from warpflat.garment.construction.border_seams import surface_seams
+from warpflat.garment.construction.details import SeamTable
 from warpflat.garment.construction.sew_pieces import sew_pieces
 from warpflat.garment.construction.to_pattern import pattern_of_surface
 from warpflat.pattern.drafting.draft import draft_garment
@@ -67,6 +68,8 @@ def test_sides_of_other_vertices_are_sewn_by_arc_length(alone: Flattening):
     before = abs(lengths(alone, "front") - lengths(alone, "back"))
     assert before > 5e-4, "there is something to sew"
     sewn = sew_pieces([alone], seams=[UNDERARM])
+    # Of another size, too, it is told what lies over itself.
+    assert sewn.summary()["pieces"]["sleeve"]["overlap_m2"] == sewn.pieces["sleeve"].overlap
     assert sewn.sewn is not None
     assert sewn.sewn.converged
     (seam,) = sewn.seams

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from warpflat.app.scene.border import SIDES, line_on_border
-from warpflat.app.scene.load import Scene, errors_named, expand_variables
+from warpflat.app.scene.load import Scene, errors_named
 from warpflat.app.scene.schema import (
     BorderTable,
     FileSurface,
@@ -145,7 +145,7 @@ def scene_sewn_panels(scene: Scene) -> list[SewnPanel]:
 
 def _file(scene: Scene, table: FileSurface) -> Path:
     with errors_named(f"{scene.where}: surface.file"):
-        path = scene.folder / expand_variables(table.file)
+        path = scene.path(table.file)
         with guarded(path, "mesh", missing="does not exist"):
             path.stat()
     return path
