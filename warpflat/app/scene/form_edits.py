@@ -12,9 +12,8 @@ from typing import Any
 from warpflat.app.scene.as_toml import tables_as_toml
 from warpflat.app.scene.cuts import asked_cuts, cut_of_dart, cuts_beside, omitted, place_of, scene_with
 from warpflat.app.scene.form import scene_form, scene_recipe
-from warpflat.app.scene.form_shaping import settle_shape
+from warpflat.app.scene.form_shaping import settle_shape, sewn_form
 from warpflat.app.scene.load import Scene
-from warpflat.app.scene.plan import plan_garment
 from warpflat.core import InputError, nearest, polyline_length
 from warpflat.garment import FormDart, FormGarment, plan_form
 
@@ -86,12 +85,13 @@ def edit_dart(
         InputError: the scene has no such dart, or the edit cannot be made.
     """
     scene, _ = settle_shape(scene, device=device)
-    before = plan_garment(scene, device=device).flatten()
+    scene, before, _ = sewn_form(scene, device=device)
     if how == "turn":
         edited = turn_dart(scene, dart, aim, before)
     else:
         edited = (rotate_dart if how == "rotate" else split_dart)(scene, dart, aim, at=at)
-    return DartEdit(before=before, after=plan_garment(edited, device=device).flatten(), scene=edited)
+    edited, after, _ = sewn_form(edited, device=device)
+    return DartEdit(before=before, after=after, scene=edited)
 
 
 def rotate_dart(scene: Scene, dart: str, line: str, *, at: str | None = None) -> Scene:

@@ -334,8 +334,9 @@ class GarmentPlan(Plan):
         )
 
     def in_cloth(self, scene: Scene) -> GarmentPlan:
-        """See :meth:`Plan.in_cloth`."""
-        return plan_garment(scene, device=self.device)
+        """See :meth:`Plan.in_cloth`; a form that is pulled on grows by its cloth, any other stays, with darts for woven cloth, too."""
+        built = None if scene.settings.pulled_on else (self.mannequin, self.form)
+        return plan_garment(scene, device=self.device, built=built)
 
     @cached_property
     def bricks(self) -> dict[str, list[str]]:
