@@ -37,6 +37,7 @@ from warpflat.garment import (
     Garment,
     Mannequin,
     garment_files,
+    size_names,
 )
 from warpflat.pattern import WrittenPattern, note_on_names, pattern_names
 
@@ -280,8 +281,9 @@ def _draft(plan: Plan, sizes: Mapping[str, Garment], folder: Path) -> WrittenPat
     scene, wanted = plan.scene, plan.scene.settings.pattern.sizes
     if set(sizes) == set(wanted):
         order = list(dict.fromkeys(wanted))
-    else:  # by their numbers where the scene leaves out the mannequin's own
-        order = sorted(sizes, key=lambda size: (int("".join(filter(str.isdigit, size)) or 0), size))
+    else:  # as the tables have them where the scene leaves out the mannequin's own
+        names = size_names()
+        order = sorted(sizes, key=lambda size: (names.index(size) if size in names else len(names), size))
     garments = {size: sizes[size] for size in order}
     found = () if plan.found is None else plan.found.seams
     pattern = garment_files(
