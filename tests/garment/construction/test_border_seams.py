@@ -18,7 +18,8 @@ from warpflat.flat.solver.options import RelaxOptions
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.paths.lines import with_lines
 from warpflat.flat.surface.shapes import make_shape
-from warpflat.garment.construction.border_seams import SeamTable, surface_seams
+from warpflat.garment.construction.border_seams import surface_seams
+from warpflat.garment.construction.details import SeamTable
 from warpflat.garment.construction.sew_pieces import sew_pieces
 from warpflat.garment.construction.to_pattern import pattern_of_surface
 from warpflat.pattern.drafting.draft import draft_garment

@@ -7,12 +7,12 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from warpflat.app.scene.load import Scene, errors_named, make_scene
-from warpflat.app.scene.schema import AutoCutTable, CutTable
+from warpflat.app.scene.schema import CutTable
 from warpflat.core import InputError, IntArray, find_unused_name, quote_value
 from warpflat.garment import Form, FormDart, Mannequin, part_pieces, taken_over
 
 if TYPE_CHECKING:
-    from warpflat.flat import AutoCut, CutPlan, Flattening, RelaxOptions, Surface
+    from warpflat.flat import AutoCutTable, CutPlan, Flattening, RelaxOptions, Surface
 
 __all__ = [
     "CutSequence",
@@ -42,7 +42,7 @@ class CutSequence:
 
     surface: Surface
     plans: tuple[CutPlan, ...] = ()
-    auto: AutoCut | None = None
+    auto: AutoCutTable | None = None
     first_auto: int = 0
     notes: tuple[str, ...] = ()
 
@@ -135,7 +135,7 @@ def plan_cuts(surface: Surface, tables: Sequence[CutTable]) -> CutSequence:
 
 def plan_automatic_cuts(
     sequence: CutSequence,
-    table: AutoCutTable,
+    auto: AutoCutTable,
     *,
     flatten: Callable[[Surface, RelaxOptions], Flattening],
     relax: RelaxOptions,
@@ -144,7 +144,7 @@ def plan_automatic_cuts(
 
     Args:
         sequence: what is cut before.
-        table: the settings.
+        auto: the settings.
         flatten: flattens a surface with the scene's other settings.
         relax: the scene's options.
 
@@ -155,11 +155,10 @@ def plan_automatic_cuts(
         InputError: a cut that is made before is refused.
     """
     from warpflat.core import InputError
-    from warpflat.flat import AutoCut, CutPlan, coarse_options, cut_automatically
+    from warpflat.flat import CutPlan, coarse_options, cut_automatically
 
-    auto = AutoCut(**table.model_dump())
     # Energies are a little higher while the relaxation is coarse: whether a cut is needed is for the full one to say.
-    search = replace(auto, stop_below=0.0, stop_below_strain=0.0)
+    search = auto.model_copy(update={"stop_below": 0.0, "stop_below_strain": 0.0})
     result = flatten_and_cut(sequence, flatten=flatten, relax=coarse_options(relax))
     why = "none would release energy without overlapping"
     try:

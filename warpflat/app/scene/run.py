@@ -31,7 +31,7 @@ from warpflat.core import (
     report_activity,
     require_memory_for_run,
 )
-from warpflat.flat import Progress, Remedy, Surface, judge, size_words
+from warpflat.flat import Progress, Remedy, Surface, extent_words, judge
 from warpflat.garment import (
     FormResult,
     Garment,
@@ -221,7 +221,7 @@ def _run(
     name_notes = note_on_names(garment.parts) if output.picture else ()
     size = ""
     if isinstance(settings.surface, FileSurface):
-        size = size_words(np.concatenate([surface.vertices for surface in plan.surfaces]), settings.surface.units)
+        size = extent_words(np.concatenate([surface.vertices for surface in plan.surfaces]), settings.surface.units)
     return SceneResult(
         metrics=metrics,
         files=tuple(files),

@@ -18,15 +18,14 @@ from pydantic import (
 
 from warpflat.app.scene.first_shapes import PIECES
 from warpflat.core import Table, is_number, plain_name, quote_value
-from warpflat.flat import DEFAULT_FABRIC, FORMER_SOLVERS, FabricTable, RelaxOptions, Solver
-from warpflat.garment import FinishingTable, FormDart, MannequinTable, OpeningTable, PocketTable, SeamTable
+from warpflat.flat import DEFAULT_FABRIC, FORMER_SOLVERS, AutoCutTable, FabricTable, RelaxOptions, Solver
+from warpflat.garment import Direction, FinishingTable, FormDart, MannequinTable, OpeningTable, PocketTable, SeamTable
 
 if TYPE_CHECKING:
     from warpflat.garment import DrapeOptions
 
 __all__ = [
     "PATH_KEYS",
-    "AutoCutTable",
     "BorderTable",
     "ClothTable",
     "ConstraintTable",
@@ -165,26 +164,12 @@ class CutTable(Table):
         return self
 
 
-class AutoCutTable(Table):
-    """Cutting by itself: the best of all candidates, again and again until it is enough (see `warpflat cuts`)."""
-
-    max_cuts: Annotated[int, Field(ge=1, le=20)] = 2
-    """At most so many; a mirrored pair counts as one."""
-    stop_below: Annotated[float, Field(ge=0.0)] = 0.0
-    """A piece of at most this model energy needs no further cut [J]."""
-    stop_below_strain: Annotated[float, Field(ge=0.0)] = 0.0
-    """A piece of which 98 % is strained by at most this share along warp and weft, as worn, needs no further cut."""
-    by: Literal["released", "per_cm"] = "released"
-    """What makes a cut the best: the energy it releases in all, or per centimetre."""
-
-
 def _as_component(value: Any) -> Any:
     if value not in ("largest", "all") and not (is_number(value, whole=True) and value >= 0):
         raise ValueError(f'should be "largest", "all" or a number from 0, largest first; got {quote_value(value)}')
     return value
 
 
-Direction = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Component = Annotated[Literal["largest", "all"] | int, BeforeValidator(_as_component)]
 
 

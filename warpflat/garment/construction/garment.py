@@ -21,14 +21,13 @@ from warpflat.core import (
     write_report,
 )
 from warpflat.flat import Flattening, run_metrics, separate
-from warpflat.garment.construction.border_seams import SeamTable
 from warpflat.garment.construction.edges import SAME_PIECE
 from warpflat.garment.construction.laid_as_cut import CutPattern
 from warpflat.garment.construction.mirror import even_sides, mirror_images
 from warpflat.garment.construction.sewn import MeasuredSeam, Sewn, Stitching
 
 if TYPE_CHECKING:
-    from warpflat.garment.construction.details import FinishingTable, OpeningTable, PocketTable
+    from warpflat.garment.construction.details import FinishingTable, OpeningTable, PocketTable, SeamTable
     from warpflat.garment.construction.rings import GarmentRing
     from warpflat.garment.construction.wearer import WearerFit
     from warpflat.pattern import Body, DraftedOutline

@@ -14,7 +14,7 @@ from warpflat.pattern import PatternOptions, WrittenPattern, check_names, write_
 
 if TYPE_CHECKING:
     from warpflat.flat import Flattening
-    from warpflat.garment.construction.border_seams import SeamTable
+    from warpflat.garment.construction.details import SeamTable
     from warpflat.garment.construction.garment import Garment
     from warpflat.pattern import FoundSeam, Pattern
 
