@@ -46,7 +46,6 @@ def put_nearest(
     run = c - a
     slope_x = (rise[2] * run[1] - run[2] * rise[1]) / area
     slope_y = (run[2] * rise[0] - rise[2] * run[0]) / area
-    # Seen edge-on, a plane's depth runs away between its corners.
     lowest = (wp.min(wp.min(a[2], b[2]), c[2]) - back) * per_depth
     highest = (wp.max(wp.max(a[2], b[2]), c[2]) - back) * per_depth
     for row in range(top, bottom + 1):
@@ -72,13 +71,11 @@ def put_nearest(
                 else:
                     right = wp.min(right, x)
         first, last = _centres_within(left, right, front.shape[1])
-        begin = (a[2] - back + slope_x * (wp.float64(first) + half - a[0]) + slope_y * (y - a[1])) * per_depth
-        end = begin + slope_x * per_depth * wp.float64(last - first)
-        depth = wp.clamp(begin, lowest, highest)
-        slope = (wp.clamp(end, lowest, highest) - depth) / wp.float64(wp.max(last - first, 1))
+        at_left = a[2] - back + slope_x * (half - a[0]) + slope_y * (y - a[1])
         for column in range(first, last + 1):
+            # Seen edge-on, a plane's depth runs away between its corners.
+            depth = wp.clamp((at_left + slope_x * wp.float64(column)) * per_depth, lowest, highest)
             wp.atomic_max(front, row, column, (wp.int64(depth + half) << wp.int64(32)) + wp.int64(t))
-            depth += slope
 
 
 @wp.func

@@ -8,13 +8,18 @@ from rounding import NOISE, RoundingNoise
 from scipy.sparse import eye_array
 from scipy.sparse.linalg import splu
 
-from warpflat.core.sums import dot
+from warpflat.core.sums import dot, range_offsets
 
 
 @pytest.mark.parametrize("count", [0, 1, 511, 5000])
 def test_a_scalar_product_is_that_of_numpy(count: int) -> None:
     a, b = np.random.default_rng(count).normal(size=(2, count))
     assert dot(a, b) == pytest.approx(float(a @ b), abs=1e-11)
+
+
+def test_ranges_begin_where_those_before_end() -> None:
+    assert range_offsets([2, 0, 3]).tolist() == [0, 2, 2, 5]
+    assert range_offsets([]).tolist() == [0]
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import warp as wp
@@ -17,6 +19,7 @@ from warpflat.kernels.drape import (
 )
 from warpflat.kernels.drape_contact import anchor_friction, carry_contact
 from warpflat.kernels.drape_steps import advance_drape, watch_power
+from warpflat.kernels.drape_stiffness import stiffen_cloth
 
 from warpflat.core.launch import launch_each
 from warpflat.flat.fabric.fabric import Fabric
@@ -51,31 +54,56 @@ def membrane_energy(x: np.ndarray) -> float:
     return AREA * (energy + 0.5 * 26.0 * gamma**2 + 0.5 * 260.0 * beyond**2)
 
 
+def cloth_at(x: np.ndarray) -> list[object]:
+    """What the kernels of one cell take whose corners lie at x (3 by 3 [m])."""
+    along = GRADIENT[:, ::-1]
+    law = make_cloth(CLOTH, (np.array([0.0, 1.0]), np.array([1.0, 0.0])), wp.get_device(DEVICE))
+    gradient = on([[-along.sum(axis=0), *along]], mat32d)
+    return [on(x, wp.vec3d), on([[0, 1, 2]], wp.vec3i), gradient, on([AREA], wp.float64), law]
+
+
+def stretched(warp: float, weft: float, shear: float) -> np.ndarray:
+    """The cell's corners, stretched and sheared, somehow in space."""
+    x = np.column_stack([FLAT, np.zeros(3)]) * [warp, weft, 1.0]
+    x[:, 0] += shear * x[:, 1]
+    return np.asarray(x @ np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0])
+
+
+def membrane_forces(x: np.ndarray) -> tuple[np.ndarray, float]:
+    force = wp.zeros(3, dtype=wp.vec3d, device=DEVICE)
+    energy = wp.zeros(1, dtype=wp.float64, device=DEVICE)
+    launch_each(evaluate_cloth, 1, cloth_at(x), [force, energy], device=DEVICE)
+    return force.numpy(), float(energy.numpy()[0])
+
+
+def differences(function: Callable[[np.ndarray], np.ndarray | float], x: np.ndarray, step: float) -> np.ndarray:
+    """Central differences by each coordinate of x, which come first."""
+    rows = []
+    for place in np.ndindex(x.shape):
+        away = np.zeros(x.shape)
+        away[place] = step
+        rows.append((np.asarray(function(x + away)) - function(x - away)) / (2 * step))
+    return np.reshape(rows, x.shape + np.shape(rows[0]))
+
+
 @pytest.mark.parametrize("stretch", [(1.03, 1.01, 0.1), (0.97, 1.03, 0.0), (0.95, 0.98, 0.2), (1.1, 0.9, 0.9)])
 def test_membrane_forces_are_minus_the_gradient_of_its_energy(stretch: tuple[float, float, float]):
-    x = np.column_stack([FLAT, np.zeros(3)]) * [stretch[0], stretch[1], 1.0]
-    x[:, 0] += stretch[2] * x[:, 1]
-    x = x @ np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
-    along = GRADIENT[:, ::-1]
-    force = wp.zeros(3, dtype=wp.vec3d, device=DEVICE)
-    law = make_cloth(CLOTH, (np.array([0.0, 1.0]), np.array([1.0, 0.0])), wp.get_device(DEVICE))
-    inputs = [
-        on(x, wp.vec3d),
-        on([[0, 1, 2]], wp.vec3i),
-        on([[-along.sum(axis=0), *along]], mat32d),
-        on([AREA], wp.float64),
-        law,
-    ]
-    energy = wp.zeros(1, dtype=wp.float64, device=DEVICE)
-    launch_each(evaluate_cloth, 1, inputs, [force, energy], device=DEVICE)
-    assert energy.numpy()[0] == pytest.approx(membrane_energy(x), rel=1e-6)
-    step, by_hand = 1e-7, np.zeros((3, 3))
-    for place in np.ndindex(3, 3):
-        away = np.zeros((3, 3))
-        away[place] = step
-        by_hand[place] = -(membrane_energy(x + away) - membrane_energy(x - away)) / (2 * step)
-    np.testing.assert_allclose(force.numpy(), by_hand, atol=2e-5 * np.abs(by_hand).max())
-    np.testing.assert_allclose(force.numpy().sum(axis=0), 0.0, atol=1e-12 * np.abs(by_hand).max())
+    x = stretched(*stretch)
+    force, energy = membrane_forces(x)
+    assert energy == pytest.approx(membrane_energy(x), rel=1e-6)
+    by_hand = -differences(membrane_energy, x, 1e-7)
+    np.testing.assert_allclose(force, by_hand, atol=2e-5 * np.abs(by_hand).max())
+    np.testing.assert_allclose(force.sum(axis=0), 0.0, atol=1e-12 * np.abs(by_hand).max())
+
+
+@pytest.mark.parametrize("stretch", [(1.03, 1.02, 0.02), (1.015, 1.03, -0.1)])
+def test_stiffness_of_pulled_cloth_is_minus_the_gradient_of_its_forces(stretch: tuple[float, float, float]):
+    x = stretched(*stretch)
+    stiffness = wp.zeros(9, dtype=wp.mat33d, device=DEVICE)
+    launch_each(stiffen_cloth, 1, [*cloth_at(x), 0.0], [stiffness], device=DEVICE)
+    by_hand = -differences(lambda at: membrane_forces(at)[0], x, 1e-8)
+    blocks = stiffness.numpy().reshape(3, 3, 3, 3).transpose(0, 2, 1, 3)
+    np.testing.assert_allclose(blocks, by_hand, atol=1e-5 * np.abs(by_hand).max())
 
 
 def make_bending(weights: np.ndarray, stiffness: np.ndarray) -> Bending:

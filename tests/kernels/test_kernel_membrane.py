@@ -416,11 +416,11 @@ def test_the_step_s_matrix_bounds_the_membrane_s_stiffness(mesh: str, name: str)
 
 
 @pytest.mark.parametrize("name", ["plain", "poisson", "soft shear"])
-def test_viscosity_is_the_rate_of_the_forces_over_a_time_step(name: str):
-    points, faces = random_triangles()
-    network = network_of(
-        make_surface(worn(points, np.eye(2), fold=False), faces), CLOTHS[name], points, grain_angle=20.0
-    )
+@pytest.mark.parametrize("mesh", ["random triangles", "bent quads"])
+def test_viscosity_is_the_rate_of_the_forces_over_a_time_step(mesh: str, name: str):
+    points, faces = random_triangles() if mesh == "random triangles" else bent_quads()
+    surface = make_surface(worn(points, np.eye(2), fold=mesh == "bent quads"), faces)
+    network = network_of(surface, CLOTHS[name], points, grain_angle=20.0)
     moving = np.random.default_rng(6).normal(size=points.shape)
     viscosity = evaluated(network, points, moving)["viscosity"]
     step = 1e-8

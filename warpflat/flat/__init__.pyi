@@ -1,5 +1,7 @@
 """The paper: from a surface to a flat layout, and its cuts."""
 
+from .cutting.auto_cut import AutoCutTable as AutoCutTable
+from .cutting.auto_cut import RankedBy as RankedBy
 from .cutting.candidates import find_candidates as find_candidates
 from .cutting.candidates import peaks_in_words as peaks_in_words
 from .cutting.crack import LaidCloth as LaidCloth
@@ -11,10 +13,8 @@ from .cutting.cut_plan import line_part as line_part
 from .cutting.dart_move import move_dart as move_dart
 from .cutting.ledger import LEAST_MOUTH as LEAST_MOUTH
 from .cutting.ledger import TRIED as TRIED
-from .cutting.ledger import AutoCut as AutoCut
 from .cutting.ledger import Ledger as Ledger
 from .cutting.ledger import LedgerEntry as LedgerEntry
-from .cutting.ledger import RankedBy as RankedBy
 from .cutting.ledger import best_of_few as best_of_few
 from .cutting.ledger import cut_automatically as cut_automatically
 from .cutting.ledger import make_ledger as make_ledger
@@ -138,10 +138,10 @@ from .surface.io.read import METRES_PER_UNIT as METRES_PER_UNIT
 from .surface.io.read import POSSIBLE as POSSIBLE
 from .surface.io.read import SUFFIXES as SUFFIXES
 from .surface.io.read import check_size as check_size
+from .surface.io.read import extent_words as extent_words
 from .surface.io.read import read_mesh_file as read_mesh_file
 from .surface.io.read import read_scan as read_scan
 from .surface.io.read import read_surface as read_surface
-from .surface.io.read import size_words as size_words
 from .surface.io.read import surface_of_file as surface_of_file
 from .surface.io.read import wrong_size as wrong_size
 from .surface.io.read_pieces import object_parts as object_parts

@@ -2,7 +2,6 @@
 
 from .construction.as_cut import garment_as_cut as garment_as_cut
 from .construction.as_cut import read_cut_pattern as read_cut_pattern
-from .construction.border_seams import BorderSeam as BorderSeam
 from .construction.border_seams import surface_seams as surface_seams
 from .construction.carry import carry as carry
 from .construction.constraints import Constraint as Constraint
@@ -17,6 +16,7 @@ from .construction.darts import measure_darts as measure_darts
 from .construction.details import FinishingTable as FinishingTable
 from .construction.details import OpeningTable as OpeningTable
 from .construction.details import PocketTable as PocketTable
+from .construction.details import SeamTable as SeamTable
 from .construction.drawn_curves import CURVES_MM as CURVES_MM
 from .construction.ease import SeamWish as SeamWish
 from .construction.ease import cap_wishes as cap_wishes
@@ -137,6 +137,7 @@ from .seams.layers import GarmentFile as GarmentFile
 from .seams.layers import read_garment as read_garment
 from .seams.layers import read_layers as read_layers
 from .seams.measure import laid_flat as laid_flat
+from .seams.options import Direction as Direction
 from .seams.options import SeamCut as SeamCut
 from .seams.options import SeamOptions as SeamOptions
 from .seams.solid import is_panel as is_panel

@@ -20,6 +20,8 @@ from warpflat.app.batch.task import Row, read_row, set_aside
 from warpflat.app.cli.batch import batch
 from warpflat.app.scene.load import load_scene
 from warpflat.core.errors import InputError
+from warpflat.core.input_files import read_result
+from warpflat.core.output import write_sealed
 
 SCENES = Path(__file__).parents[3] / "scenes"
 PATCH = """
@@ -113,6 +115,20 @@ def test_a_key_follows_content_not_paths(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
+    "named", ["[seams]\nbody = 'named'\n", "[find_seams]\nbody = 'named'\n", "[[seams_cut]]\nedges = 'named'\n"]
+)
+def test_each_file_that_a_scene_names_starts_in_its_folder_and_counts(tmp_path: Path, named: str):
+    (tmp_path / "mesh.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n")
+    (tmp_path / "patch.toml").write_text('[surface]\nfile = "mesh.obj"\n' + named)
+    (tmp_path / "b.toml").write_text('scenes = ["patch.toml"]\n')
+    (tmp_path / "named").write_text("0 1\n")
+    (task,) = load_batch(tmp_path / "b.toml")
+    assert str(tmp_path / "named") in json.dumps(task.data)
+    (tmp_path / "named").write_text("1 2\n")
+    assert load_batch(tmp_path / "b.toml")[0].key != task.key
+
+
+@pytest.mark.parametrize(
     ("text", "words"),
     [
         ("", "is empty"),
@@ -143,7 +159,17 @@ def test_what_is_done_is_not_done_again(tmp_path: Path):
     assert [row.status for row in rows] == ["at rest"] * 3
     assert seen == [(2, 2), (3, 2)]
     assert {name: files(out)[name] for name in before} == before
-    (out / tasks[0].key / "metrics.json").unlink()  # half a result is none
+    # It is done where `warpflat run` would end with 0.
+    metrics = out / tasks[0].key / "metrics.json"
+    for fault in (
+        {"pattern": {"seams_that_differ": ["side"], "seam_difference_mm": 9.0, "seam_difference_per_50mm_mm": None}},
+        {"garment": {"no_pattern": "no pattern yet"}},
+        {"left_out": ["it was not sewn"]},
+    ):
+        write_sealed(metrics, {**read_result(metrics), **fault})
+        assert read_row(tasks[0], out).status == "not at rest"
+        write_sealed(metrics, {key: value for key, value in read_result(metrics).items() if key not in fault})
+    metrics.unlink()  # half a result is none
     assert read_row(tasks[0], out) is None
 
 

@@ -67,6 +67,13 @@ def test_a_mistake_is_one_line(
     assert "\n" not in error
 
 
+def test_the_scan_of_a_sewing_file_starts_in_its_folder(tube: Path, capsys: pytest.CaptureFixture[str]):
+    table = tube.with_name("worn.toml")
+    table.write_text('[mannequin]\nscan = "gone.obj"\n')
+    assert main(["drape", str(tube), "--seams", str(table)]) == 2
+    assert str(tube.with_name("gone.obj")) in capsys.readouterr().err
+
+
 def test_edges_are_listed(tube: Path, capsys: pytest.CaptureFixture[str]):
     assert main(["drape", str(tube), "--edges"]) == 0
     lines = capsys.readouterr().out.splitlines()

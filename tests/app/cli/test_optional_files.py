@@ -140,6 +140,14 @@ def test_a_drape_is_done_without_its_pictures(
     assert Path("out/frames.usdc").stat().st_size > 1000  # how it was flattened
 
 
+def test_a_corrected_pattern_is_cut_from_the_scenes_cloth() -> None:
+    cloth = "[cloth]\nshrinkage_warp = 0.2\nlining = 'satin'\n[pattern]\nformats = ['svg']\n"
+    bare = DOME.replace("frames = 4", "frames = 0\npicture = false")
+    Path("dome.toml").write_text(bare + HELD + "correct = true\n" + cloth)
+    assert main(["run", "dome.toml", "--out", "out", "-q"]) == 0
+    assert all("satin" in Path("out", f"{name}.svg").read_text() for name in ("dome", "dome.corrected"))
+
+
 @pytest.mark.parametrize(
     "place",
     [

@@ -131,6 +131,31 @@ def test_several_bodies_are_a_study_with_asked_ease(command: Command):
         assert Path("study", folder, "pattern.json").is_file()
 
 
+def test_scans_of_one_name_are_told_apart_and_none_is_replaced(command: Command):
+    model = BodyModel.load()
+    person = Person(
+        shape=np.zeros(len(model.shapes)),
+        bend=rotation(np.zeros((len(model.joints), 3))),
+        turn=np.eye(3),
+        scale=1.7,
+        place=np.zeros(3),
+    )
+    matrix, triangles = finer_body()
+    _skirt(Path("skirt.obj"))
+    files = [Path(folder, "skirt.body.obj") for folder in "ab"]
+    for file in files:
+        file.parent.mkdir()
+        trimesh.Trimesh(matrix @ model.vertices(person), triangles, process=False).export(file)
+    asked = ("fit", "skirt.obj", "--units", "m", *ON, *BARE, "--to", str(files[0]))
+    assert command(*asked, "--to", str(files[1]), "--out", "study").code in (0, 1)
+    bodies = json.loads(Path("study/fit.json").read_text(encoding="utf-8"))["bodies"]
+    assert [(each["body"], each["folder"]) for each in bodies] == [
+        ("skirt.body", "study/skirt.body"),
+        ("skirt.body 2", "study/skirt.body_2"),
+    ]
+    assert "skirt.body.obj" in command(*asked, "--out", "a").refusal
+
+
 def test_without_its_body_one_is_fitted_inside(tmp_path: Path):
     _skirt(tmp_path / "skirt.obj", unit=0.01)
     job = FitJob.start(tmp_path / "skirt.obj", units="cm")
@@ -148,6 +173,15 @@ def test_without_its_body_one_is_fitted_inside(tmp_path: Path):
         assert ended.row()["fits"] is fits
     # Whatever the file's unit, the carried mesh is in metres.
     assert np.ptp(carried.vertices[:, 1]) == pytest.approx(0.55, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("front", "faces"), [("+x", (1.0, 0.0, 0.0)), ("-x", (-1.0, 0.0, 0.0)), ("-z", (0.0, 0.0, -1.0))]
+)
+def test_the_front_is_turned_to_where_a_body_faces(tmp_path: Path, front: str, faces: tuple[float, float, float]):
+    _skirt(tmp_path / "skirt.obj")
+    job = FitJob.start(tmp_path / "skirt.obj", units="m", front=front)
+    assert np.array(faces) @ job.turn == pytest.approx([0.0, 0.0, 1.0])
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from warpflat.app.scene.frames import FrameSchedule
-from warpflat.app.scene.load import load_scene, scene_fabric
+from warpflat.app.scene.load import fabric_of_correction, load_scene, scene_fabric
+from warpflat.app.scene.plan import plan_scene
 from warpflat.app.scene.run import run_scene
 from warpflat.app.scene.schema import OutputTable
 from warpflat.app.scene.surface import scene_surface
@@ -86,6 +87,16 @@ def test_the_only_fabric_of_the_files_is_meant_and_of_several_one_must_be_named(
     write_scene(tmp_path, "[mine]\nbase = 'denim'\n[yours]\nbase = 'mine'\n", "cloth.toml")
     with pytest.raises(InputError, match=r"fabric is not given.*mine, yours"):
         load_scene(write_scene(tmp_path, start + surface))
+
+
+def test_the_cloth_of_a_correction_is_looked_for_before_anything_is_made(tmp_path: Path):
+    write_scene(tmp_path, "[mine]\nbase = 'denim'\nshear_stiffness = 40.0\n", "cloth.toml")
+    start = "fabric = 'denim'\nfabric_files = ['cloth.toml']\n[surface]\nshape = 'dome'\n[drape]\ncorrect_fabric = "
+    cloth = fabric_of_correction(load_scene(write_scene(tmp_path, f"{start}'mine'\n")))
+    assert cloth is not None
+    assert cloth.shear_stiffness == 40.0
+    with pytest.raises(InputError, match=r"drape\.correct_fabric: unknown fabric 'mien'.*'mine'"):
+        plan_scene(load_scene(write_scene(tmp_path, f"{start}'mien'\n")))
 
 
 def test_scenes_and_fabrics_may_begin_with_a_byte_order_mark(tmp_path: Path):

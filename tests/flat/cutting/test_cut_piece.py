@@ -15,11 +15,12 @@ import warpflat
 from warpflat.app.scene.cuts import plan_cuts
 from warpflat.app.scene.schema import CutTable
 from warpflat.core.errors import InputError
+from warpflat.flat.cutting.auto_cut import AutoCutTable
 from warpflat.flat.cutting.candidates import find_candidates, find_peaks
 from warpflat.flat.cutting.cut_piece import cut
 from warpflat.flat.cutting.cut_plan import CutPlan, draw_line, line_part
 from warpflat.flat.cutting.dart_move import move_dart
-from warpflat.flat.cutting.ledger import AutoCut, cut_automatically, make_ledger
+from warpflat.flat.cutting.ledger import cut_automatically, make_ledger
 from warpflat.flat.cutting.refine_piece import refine_along
 from warpflat.flat.cutting.separate_pieces import separate
 from warpflat.flat.flattening.progress import Progress
@@ -451,13 +452,15 @@ def test_the_ledger_ranks_candidates_by_what_they_release(bodice: Flattening):
     # Coarse is enough to rank: within a few per cent of the full relaxation.
     full = cut(bodice, CutPlan(name="x", paths=pair.candidate.paths))
     assert pair.released == pytest.approx(stored(bodice) - stored(full), rel=0.05)
+    widest = max(seam["opening_m"] for seam in full.measures["cuts"][0]["seams"])
+    assert pair.opening == pytest.approx(widest, rel=0.05)
 
 
 def test_cutting_by_itself_stops_when_it_is_enough(bodice: Flattening):
-    untouched, none = cut_automatically(bodice, AutoCut(stop_below=1.01 * stored(bodice)))
+    untouched, none = cut_automatically(bodice, AutoCutTable(stop_below=1.01 * stored(bodice)))
     assert untouched is bodice
     assert none == ()
-    result, ledgers = cut_automatically(bodice, AutoCut(max_cuts=1, by="per_cm"))
+    result, ledgers = cut_automatically(bodice, AutoCutTable(max_cuts=1, by="per_cm"))
     assert len(result.cuts) == len(ledgers) == 1
     assert len(result.cuts[0].paths) == 2, "of a mirrored pair both are cut"
     assert result.converged
@@ -506,7 +509,7 @@ def test_no_way_inwards_begins_beside_an_earlier_cut():
     assert ways
     mouths = np.array([path.points[0] for one in ways for path in one.drawn])
     assert np.linalg.norm(mouths - first.drawn[0].points[0], axis=1).min() > 0.03
-    result, _ = cut_automatically(flat, AutoCut(max_cuts=3))
+    result, _ = cut_automatically(flat, AutoCutTable(max_cuts=3))
     names = [made.name for made in result.cuts]
     assert len(set(names)) == len(names) > 0
 
@@ -517,7 +520,7 @@ def test_a_cut_that_overlaps_is_told_and_not_made_by_itself():
     ledger = make_ledger(flat)
     assert ledger.entries[0].released > 0
     assert all(not entry.helps and entry.angle < 0 for entry in ledger.entries)
-    assert cut_automatically(flat, AutoCut())[0] is flat
+    assert cut_automatically(flat, AutoCutTable())[0] is flat
 
 
 def test_a_piece_that_lies_flat_but_for_rounding_has_nothing_to_cut_for():
@@ -528,7 +531,7 @@ def test_a_piece_that_lies_flat_but_for_rounding_has_nothing_to_cut_for():
 
 def test_a_piece_without_energy_has_nothing_to_cut_for():
     flat = warpflat.flatten(make_shape("cylinder", resolution=9), fabric="woven", datum="centre")
-    result, ledgers = cut_automatically(flat, AutoCut(stop_below=1e-6))
+    result, ledgers = cut_automatically(flat, AutoCutTable(stop_below=1e-6))
     assert result is flat
     assert ledgers == ()
 

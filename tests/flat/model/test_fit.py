@@ -71,6 +71,13 @@ def test_tension_is_per_width_of_the_cloth_as_worn():
     np.testing.assert_allclose(result.fit.pressure, expected / RADIUS, rtol=0.01)
 
 
+def test_a_pressure_is_reached_beside_a_stretch_of_the_other_threads():
+    wear = Wear(pressure=800.0, stretch_warp=0.1)
+    result = warpflat.flatten(sleeve(), fabric=NET, datum="centre", wear=wear, device=DEVICE)
+    np.testing.assert_allclose(result.fit.strain_warp, 0.1, atol=1e-3)
+    np.testing.assert_allclose(result.fit.pressure, 800.0, rtol=0.02)
+
+
 @pytest.mark.parametrize("model", ["springs", "membrane"])
 def test_a_cone_gets_the_pressure_asked_for(model: str):
     surface = make_shape("cone", bottom=0.03, top=0.04, height=0.2, angle=300.0)

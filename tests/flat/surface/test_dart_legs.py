@@ -38,6 +38,17 @@ def test_legs_end_short_of_the_tip_and_keep_their_ends_their_shape_and_the_ratio
     assert are_curved(new_left, new_right) == are_curved(left, right) == (bulge > 0)
 
 
+def test_a_tip_may_move_as_far_as_the_shorter_leg_reaches_along_the_middle():
+    tip = np.array([0.01, 0.25])
+    left, right = arc((-0.05, 0.0), tip, 0.0), arc((0.16, 0.12), tip, 0.0)
+    ways = [(leg[0] - tip) / np.linalg.norm(leg[0] - tip) for leg in (left, right)]
+    middle = sum(ways) / np.linalg.norm(sum(ways))
+    most = min(np.linalg.norm(leg[0] - tip) for leg in (left, right)) * (ways[0] @ middle)
+    pull_back(left, right, 0.999 * most)
+    with pytest.raises(InputError, match="less than the dart's length"):
+        pull_back(left, right, 1.001 * most)
+
+
 @pytest.mark.parametrize("tip_back", [-0.01, 0.3, np.nan])
 def test_a_tip_stays_within_its_dart(tip_back):
     left, right = arc((-0.05, 0.0), (0.0, 0.25), 0.0), arc((0.05, 0.0), (0.0, 0.25), 0.0)

@@ -172,6 +172,17 @@ def test_closed_curve_gives_a_closed_line(tube):
     assert len(line) == 25
 
 
+def test_closed_curve_that_meets_one_vertex_only_goes_around(sheet):
+    curve = sheet.vertices[8] + np.array([[0, 0], [2.3, 0.3], [2.2, 1.6], [0.4, 1.7], [0, 0]]) @ [
+        [1 / 6, 0, 0],
+        [0, 1 / 4, 0],
+    ]
+    line = line_from_curve(sheet, curve)
+    assert line[0] == line[-1] == 8
+    assert runs_along_edges(sheet, line)
+    assert {10, 17, 24} < set(line.tolist())
+
+
 def test_curve_off_the_piece_is_refused(sheet):
     with pytest.raises(InputError, match=r"curve 'hem' does not lie on the piece 'sheet': its point 1 is 4 m off"):
         line_from_curve(sheet, [[0, 0, 0], [5, 1, 0]], name="hem")

@@ -31,7 +31,7 @@ def body():
 @pytest.fixture(scope="module")
 def block(body):
     eased = replace(shipped_form("basic_block"), ease=ease_from("close", "test"))
-    return shaped_form(body.layout, eased, "darts")
+    return shaped_form(body.layout, eased, "darts", body.vertices)
 
 
 @pytest.fixture(scope="module")
@@ -173,13 +173,13 @@ def test_legs_that_overlap_close_where_they_meet():
 
 def test_a_dress_has_darts_with_two_tips(body):
     eased = replace(shipped_form("dress"), ease=ease_from("close", "test"))
-    darts = shaped_form(body.layout, eased, "darts").darts
+    darts = shaped_form(body.layout, eased, "darts", body.vertices).darts
     assert [(d.piece, d.name) for d in darts] == [
         ("front", "bust dart"),
         ("front", "waist dart"),
         ("back", "waist dart"),
     ]
-    form = body.form(shaped_form(body.layout, eased, "darts"))
+    form = body.form(shaped_form(body.layout, eased, "darts", body.vertices))
     waist, bust = (body.layout.lines[level] for level in ("waist", "bust"))
     for piece in form.pieces.values():
         assert set(piece.fisheyes) == {"waist dart left", "waist dart right"}
@@ -226,7 +226,7 @@ def test_the_width_of_a_dart_with_two_tips_can_be_asked_for(body):
 
 
 def test_princess_seams_part_the_pieces(body):
-    form = body.form(shaped_form(body.layout, shipped_form("bodice"), "princess"))
+    form = body.form(shaped_form(body.layout, shipped_form("bodice"), "princess", body.vertices))
     assert list(form.pieces) == [
         f"{face}_{part}" for face in ("front", "back") for part in ("centre", "side_left", "side_right")
     ]
@@ -234,7 +234,7 @@ def test_princess_seams_part_the_pieces(body):
     own = form_from_mapping(
         "sleeve", {"pieces": {"arm": {"bricks": ["armhole-biceps/arm-left-*"], "open": ["underarm left"]}}}
     )
-    assert shaped_form(body.layout, own, "princess").pieces == own.pieces
+    assert shaped_form(body.layout, own, "princess", body.vertices).pieces == own.pieces
 
 
 def test_darts_whose_legs_overlap_are_refused(sewn):

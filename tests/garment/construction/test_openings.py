@@ -11,13 +11,17 @@ from flat_forms import pattern_of, whole_draft
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
+from warpflat.garment.construction import openings
 from warpflat.garment.construction.details import OpeningTable
 from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.garment import Garment
-from warpflat.garment.construction.openings import one_sided, part_at_centres
-from warpflat.garment.mannequin.forms import shipped_form
+from warpflat.garment.construction.openings import one_sided, part_at_centres, sewn_centres
+from warpflat.garment.construction.rings import find_rings, ring_line
+from warpflat.garment.construction.to_pattern import pattern_of_garment
+from warpflat.garment.mannequin.forms import Form, PieceRecipe, shipped_form
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.pattern.drafting.draft import draft_garment
+from warpflat.pattern.drafting.edge_rules import EdgeRules
 from warpflat.pattern.drafting.pieces import Pattern, Piece
 from warpflat.pattern.drafting.sewing_order import sewn_seams
 
@@ -153,3 +157,33 @@ def test_opening_that_cannot_be_is_named(skirt: Garment):
     )
     with pytest.raises(InputError, match="leaves nothing of the seam"):
         opened(skirt, OpeningTable(kind="vent", seam="centre back", length_mm=1e3 * whole - 10))
+
+
+@pytest.mark.parametrize("kind", ["zip", "vent", "slit", "godet"])
+def test_a_half_that_is_cut_twice_is_opened_once(mannequin: Mannequin, kind: str):
+    """Its centre seam has one edge, of the piece and of its mirror image."""
+    opening = OpeningTable(kind=kind, seam="centre back", length_mm=150)
+    form = Form(name="x", pieces={side: PieceRecipe(bricks=(f"waist-knee/{side}-*",)) for side in ("front", "back")})
+    half = flatten_form(mannequin, mannequin.form(form, half=True), sewn=False)
+    rules = sewn_centres(EdgeRules(), [opening])
+    pattern, _ = pattern_of_garment({"": replace(half, openings=(opening,))}, name="x", rules=rules)
+    back = pattern.piece("back", "")
+    assert back.quantity == 2
+    if kind == "zip":
+        assert [name for name in back.internal_lines if "zip" in name] == ["invisible zip 150 mm"]
+    else:
+        assert back.edge(f"centre back {kind}").length == pytest.approx(0.15, abs=1e-3)
+    if kind == "godet":
+        sewn = [seam.sides for seam in pattern.seams if seam.name.startswith("centre back godet")]
+        assert [(shell.mirrored, wedge.edge) for (shell,), (wedge,) in sewn] == [(False, "left"), (True, "right")]
+
+
+def test_two_rings_at_one_line_are_opened_each_by_its_own(mannequin: Mannequin, skirt: Garment, monkeypatch):
+    found = find_rings(mannequin, skirt.form, skirt.positions)
+    waist, length = next((ring, length) for ring, length in found if ring_line(mannequin, ring) == "waist")
+    shorter = waist[:0], 0.5 * length
+    monkeypatch.setattr(openings, "find_rings", lambda *_: [(waist, length), shorter])
+    monkeypatch.setattr(openings, "ring_line", lambda *_: "waist")
+    more = openings.opened_rings(mannequin, skirt.form, skirt.positions, [ZIP])
+    assert more["waist"] == pytest.approx(0.4)
+    assert more.get("waist 2", 0.0) == 0.0

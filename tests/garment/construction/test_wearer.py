@@ -1,5 +1,7 @@
 """How a garment fits the body itself, place by place: ease where the cloth is larger, strain and pressure where it is smaller."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bodies import body_of_size
@@ -24,6 +26,18 @@ def test_a_tape_spans_hollows_and_turns_once() -> None:
     assert float(tape.curvature @ weights) == pytest.approx(2.0 * np.pi, rel=0.01)
     hollow = radius < 0.125
     assert tape.curvature[hollow].max() < 1e-6 < tape.curvature[radius > 0.1599].min()
+
+
+@pytest.mark.parametrize("grain_angle", [0.0, 20.0, 45.0, 70.0, 90.0])
+def test_cloth_around_the_body_is_pulled_as_by_its_compliance_turned(grain_angle: float) -> None:
+    """The strain n . (S : nn) n of a stress along n alone, warp upright at 0 degrees."""
+    cloth = replace(find_fabric("denim"), curve_warp=(), curve_weft=(), poisson_ratio=0.2)
+    warp, weft, shear = 1.0 / cloth.stiffness_warp, 1.0 / cloth.stiffness_weft, 1.0 / cloth.shear_stiffness
+    cross = -cloth.poisson_ratio * warp
+    compliance = np.array([[warp, cross, 0.0], [cross, weft, 0.0], [0.0, 0.0, shear]])
+    along_warp, along_weft = np.sin(np.radians(grain_angle)), np.cos(np.radians(grain_angle))
+    stress = np.array([along_warp**2, along_weft**2, along_warp * along_weft])
+    assert tension_around(cloth, grain_angle, 0.01) == pytest.approx(0.01 / (stress @ compliance @ stress), rel=1e-9)
 
 
 def test_ease_where_the_cloth_is_larger_and_strain_where_it_is_smaller() -> None:

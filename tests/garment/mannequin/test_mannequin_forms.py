@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
+from bodies import body_of_size
 from self_intersections import self_intersections
 
 from warpflat.core.errors import InputError
-from warpflat.garment.mannequin.blend import blend_forms, bridge_rows
-from warpflat.garment.mannequin.forms import form_from_mapping, form_names
+from warpflat.garment.mannequin.blend import Adjustment, adjusted_vertices, blend_forms, bridge_rows
+from warpflat.garment.mannequin.bricks import select_bricks
+from warpflat.garment.mannequin.darts import standard_darts
+from warpflat.garment.mannequin.forms import Form, PieceRecipe, form_from_mapping, form_names
 from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.garment.mannequin.part_pieces import princess_seams, taken_over
 from warpflat.garment.mannequin.profiles import convex_girth
 from warpflat.garment.mannequin.seam_names import name_seams
 
@@ -372,3 +379,22 @@ def test_a_skirt_hangs_straight_from_a_belly(body: Mannequin) -> None:
     assert form.ease["hip"] == 3.0
     girths = [convex_girth(vertices[rows["hip"]]) for vertices in (form.vertices, body.vertices)]
     assert girths[0] - girths[1] == pytest.approx(0.03, abs=0.0015)
+
+
+@pytest.mark.parametrize("level", ["chest", "biceps", "elbow"])
+@pytest.mark.parametrize("change", [{"raise_cm": 4.0}, {"bridge": True}])
+def test_what_a_profile_cannot_do_is_refused(level: str, change: dict[str, Any]) -> None:
+    body = body_of_size(30.0)
+    with pytest.raises(InputError, match=f"profile {level}: it is neither bridged nor raised"):
+        adjusted_vertices(body.layout, body.vertices, {level: Adjustment(**change)})
+
+
+def test_a_dart_of_another_piece_does_not_stand_for_one_that_a_seam_takes_over() -> None:
+    layout, vertices = body_of_size(30.0).layout, body_of_size(30.0).vertices
+    recipes = {"bodice": ("shoulder-waist/front-*",), "skirt": ("waist-knee/front-*",)}
+    form = Form(name="x", pieces={name: PieceRecipe(bricks=bricks) for name, bricks in recipes.items()})
+    bricks = {name: select_bricks(layout, piece.bricks) for name, piece in form.pieces.items()}
+    form = replace(form, darts=standard_darts(layout, bricks))
+    gone = taken_over(layout, vertices, form, princess_seams(layout, bricks["bodice"], "bodice"))
+    assert {dart.name for dart in gone if dart.piece == "bodice"} == {"bust dart", "waist dart"}
+    assert {dart.piece for dart in gone} == {"bodice"}

@@ -78,7 +78,7 @@ def test_trousers_are_sewn_from_four_pieces_around_the_crotch(body: Mannequin) -
 
 
 def test_trousers_take_waist_darts(body: Mannequin) -> None:
-    form = body.form(shaped_form(body.layout, shipped_form("trousers"), "darts"))
+    form = body.form(shaped_form(body.layout, shipped_form("trousers"), "darts", body.vertices))
     lengths = {}
     for dart in form.darts:
         row = form.vertices[dart.row]

@@ -234,7 +234,7 @@ def test_drafted_pieces_stand_below_the_others_with_their_longer_side_across(tmp
     said = "grey: drafted for its edges, laid by its seams; not shown on the body: collar"
     assert said in {text.get_text() for text in worn.axes[0].texts}
     # What is as long as three metres is drawn smaller, within the page; its outline is closed.
-    shapes = [patch.get_xy() for patch in figure.axes[0].patches if isinstance(patch, Polygon)][-2:]
+    shapes = [patch.get_xy() for patch in figure.axes[0].patches if isinstance(patch, Polygon) and patch.zorder == 3]
     assert np.ptp(shapes[0][:, 0]) < figure.get_size_inches()[0]
     assert np.ptp(shapes[0][:, 0]) / np.ptp(shapes[1][:, 0]) == pytest.approx(10.0)
     assert all(shape[:, 1].min() > 0.0 for shape in shapes)

@@ -49,9 +49,7 @@ def write_body_picture(path: str | os.PathLike[str], patterns: Sequence[BodyPatt
                     ax.plot(100 * ends, (trend.slope * ends + trend.offset) / one, color=colour, linewidth=1)
                     label += f": {trend.slope / one / 100:+.2g} {unit}/cm, R² {trend.determination:.2f}"
                 ax.scatter(100 * x, y / one, s=14, color=colour, label=label)
-            ax.set_xlabel(f"{level} [cm]")
-            ax.set_ylabel(f"{_WORDS[name]} [{unit.replace('cm2', 'cm²')}]")
-            _finish(ax)
+            _finish(ax, level, f"{_WORDS[name]} [{unit.replace('cm2', 'cm²')}]")
     if graded:
         for ax, level in zip(axes[-1], BODY_GIRTHS, strict=True):
             members = [pattern for pattern in graded if level in pattern.graded_ease and level in pattern.ease]
@@ -67,13 +65,12 @@ def write_body_picture(path: str | os.PathLike[str], patterns: Sequence[BodyPatt
                     eases = [100 * p.graded_ease[level] for _, p in chosen]
                     ax.scatter([at for at, _ in chosen], eases, s=14, color=colour, label=label)
             ax.axhline(0.0, color=_INK, linewidth=0.6)
-            ax.set_xlabel(f"{level} [cm]")
-            ax.set_ylabel(f"ease at {level} [cm]")
-            _finish(ax)
+            _finish(ax, level, f"ease at {level} [cm]")
     write_figure(path, figure)
 
 
-def _finish(ax: Axes) -> None:
+def _finish(ax: Axes, level: str, words: str) -> None:
+    ax.set(xlabel=f"{level} [cm]", ylabel=words)
     ax.spines[["top", "right"]].set_visible(False)
     ax.tick_params(labelsize=8)
     if ax.has_data():

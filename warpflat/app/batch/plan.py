@@ -16,6 +16,7 @@ from pydantic import Field, model_validator
 
 from warpflat._version import __version__
 from warpflat.app.scene.load import Scene, errors_named, expand_variables, make_scene
+from warpflat.app.scene.schema import PATH_KEYS
 from warpflat.core import InputError, Table, check_table, file_digest, quote_value, read_toml, with_plain_letters
 from warpflat.garment import MannequinTable
 
@@ -221,17 +222,14 @@ def _with_absolute_paths(data: Mapping[str, Any], folder: Path) -> dict[str, Any
 def _map_paths(data: Mapping[str, Any], change: Callable[[str], str]) -> dict[str, Any]:
     """Return a scene's tables with all paths of files changed; what is no text is left to the check of the scene."""
 
-    def changed(table: Mapping[str, Any], key: str) -> dict[str, Any]:
-        value = table.get(key)
-        return {**table, key: change(value)} if isinstance(value, str) and value else dict(table)
+    def changed(value: Any, keys: Sequence[str]) -> Any:
+        if isinstance(value, list):
+            return [changed(each, keys) for each in value]
+        if isinstance(value, Mapping) and keys and keys[0] in value:
+            return {**value, keys[0]: changed(value[keys[0]], keys[1:])}
+        return change(value) if isinstance(value, str) and value and not keys else value
 
-    found = changed(data, "start")
-    for table, key in (("surface", "file"), ("mannequin", "scan")):
-        if isinstance(found.get(table), Mapping):
-            found[table] = changed(found[table], key)
-    if isinstance(found.get("fabric_files"), list):
-        found["fabric_files"] = [change(file) if isinstance(file, str) else file for file in found["fabric_files"]]
-    return found
+    return functools.reduce(changed, PATH_KEYS, dict(data))
 
 
 def _path(file: str, folder: Path) -> str:

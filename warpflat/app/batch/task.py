@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.app.batch.plan import Task
+from warpflat.app.review.faults import is_done
 from warpflat.core import (
     InputError,
     NotOursError,
@@ -196,7 +197,7 @@ def read_row(task: Task, out: Path) -> Row | None:
             raise ValueError(fits)
         return Row(
             task=task,
-            status=AT_REST if _is_at_rest(metrics) else NOT_AT_REST,
+            status=AT_REST if is_done(metrics) else NOT_AT_REST,
             strain_energy_j=sum(_number(piece["strain_energy_j"]) for piece in pieces),
             fits=fits,
             girths_m={
@@ -217,19 +218,6 @@ def _number(value: Any) -> float:
     if not (is_number(value) and abs(number := float(value)) < float("inf")):
         raise ValueError(value)
     return number
-
-
-def _is_at_rest(metrics: Mapping[str, Any]) -> bool:
-    """Return whether all is well with every piece, the seams and the drape, in every size."""
-    return (
-        all(
-            piece["converged"] and not piece["flipped_faces"] and not piece.get("overlap_m2")
-            for piece in metrics["pieces"].values()
-        )
-        and metrics.get("sewing", {}).get("converged", True)
-        and metrics.get("drape", {}).get("converged", True)
-        and all(_is_at_rest(other) for other in metrics.get("sizes", {}).values())
-    )
 
 
 def _write_error(task: Task, out: Path, status: str, message: str, trace: str = "") -> None:

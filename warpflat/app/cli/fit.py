@@ -20,7 +20,15 @@ from warpflat.app.cli.options import (
     tell,
 )
 from warpflat.app.cli.run import report_run, start_warp_silently
-from warpflat.core import InputError, make_file_name, quote_value, refuse_to_replace_others, with_plain_letters
+from warpflat.core import (
+    InputError,
+    find_unused_name,
+    listening_to_reads,
+    make_file_name,
+    quote_value,
+    refuse_to_replace_others,
+    with_plain_letters,
+)
 
 __all__ = ["fit"]
 
@@ -103,6 +111,7 @@ def fit(
     from warpflat.app.cli.progress_bar import ProgressBar
     from warpflat.app.scene.fit import (
         STUDY_FILES,
+        Carried,
         FitJob,
         Fitted,
         check_tables,
@@ -135,7 +144,12 @@ def fit(
         garment, units=options["units"], prim=options["prim"], name=name, front=options["front"], body=body
     )
     # Every body is built before the first pattern, so that a wrong one is refused at once.
-    carried = [job.to(wearer, ease, keep_pose=options["keep_pose"]) for wearer in bodies]
+    sources, carried = list(job.sources), list[Carried]()
+    with listening_to_reads(sources.append):
+        for wearer in bodies:
+            one = job.to(wearer, ease, keep_pose=options["keep_pose"])
+            carried.append(replace(one, body=find_unused_name(one.body, {other.body for other in carried})))
+    job = replace(job, sources=tuple(sources))
     code, fitted = 0, []
     for one in carried:
         to = folder if len(bodies) == 1 else folder / make_file_name(one.body).replace(" ", "_")

@@ -8,7 +8,7 @@ from typing import Any
 
 from warpflat.core import energy_words, format_count
 
-__all__ = ["faults_of"]
+__all__ = ["faults_of", "is_done"]
 
 # A seam or constraint that fails by more than this gets a warning [mm].
 _WARNED_MISS = 0.2
@@ -16,6 +16,11 @@ _WARNED_MISS = 0.2
 _FALLEN = 0.3
 # No cloth is worn stretched by more than this share.
 _TORN = 0.5
+
+
+def is_done(metrics: Mapping[str, Any]) -> bool:
+    """Return whether a run is without faults, and nothing that its pattern needs was left out: the command ends with 0."""
+    return not faults_of(metrics) and not metrics.get("left_out")
 
 
 def faults_of(metrics: Mapping[str, Any]) -> list[str]:

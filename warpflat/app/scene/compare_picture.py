@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from textwrap import fill
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -12,7 +13,7 @@ from matplotlib.lines import Line2D
 from warpflat.app.scene.comparison import Comparison, outline
 from warpflat.core import atomic_path
 from warpflat.flat import border_loops
-from warpflat.pattern import all_letters, new_figure
+from warpflat.pattern import all_letters, new_figure, write_figure
 
 __all__ = ["write_overlay_picture", "write_overlay_svg"]
 
@@ -35,6 +36,12 @@ def _style(number: int) -> tuple[str, tuple[float, ...]]:
     return _STYLES[number % len(_STYLES)]
 
 
+def _stroke(number: int) -> dict[str, str]:
+    """Return the colour and the dashes of a fabric's lines in SVG."""
+    colour, dashes = _style(number)
+    return {"stroke": colour} | ({"stroke-dasharray": " ".join(f"{d:g}" for d in dashes)} if dashes else {})
+
+
 def write_overlay_svg(path: str | os.PathLike[str], comparison: Comparison) -> None:
     """Write the outlines in true size (a unit is a millimetre), in a group per piece with a path per fabric.
 
@@ -49,25 +56,19 @@ def write_overlay_svg(path: str | os.PathLike[str], comparison: Comparison) -> N
         low, high = 1e3 * points.min(axis=0), 1e3 * points.max(axis=0)
         group = ET.SubElement(root, "g", {"id": piece.replace(" ", "_"), "fill": "none", "stroke-width": "0.4"})
         for number, fabric in enumerate(comparison.fabrics):
-            colour, dashes = _style(number)
             parts = []
             for loop in outline(comparison.results[fabric][piece], comparison.layouts[fabric][piece]):
                 x = 1e3 * loop[:-1, 0] - low[0] + left
                 y = high[1] - 1e3 * loop[:-1, 1] + legend + _MARGIN_MM
                 parts.append("M" + " L".join(f"{a:.3f},{b:.3f}" for a, b in zip(x, y, strict=True)) + " Z")
-            attributes = {"id": f"{piece}.{fabric}".replace(" ", "_"), "stroke": colour, "d": " ".join(parts)}
-            if dashes:
-                attributes["stroke-dasharray"] = " ".join(f"{d:g}" for d in dashes)
-            ET.SubElement(group, "path", attributes)
+            attributes = {"id": f"{piece}.{fabric}".replace(" ", "_"), "d": " ".join(parts)}
+            ET.SubElement(group, "path", attributes | _stroke(number))
         left += float(high[0] - low[0]) + _MARGIN_MM
         height = max(height, float(high[1] - low[1]))
     for number, fabric in enumerate(comparison.fabrics):
-        colour, dashes = _style(number)
         y = _MARGIN_MM + 6.0 * number
-        line = {"x1": f"{_MARGIN_MM}", "x2": f"{_MARGIN_MM + 20}", "y1": f"{y}", "y2": f"{y}", "stroke": colour}
-        if dashes:
-            line["stroke-dasharray"] = " ".join(f"{d:g}" for d in dashes)
-        ET.SubElement(root, "line", {**line, "stroke-width": "0.6"})
+        line = {"x1": f"{_MARGIN_MM}", "x2": f"{_MARGIN_MM + 20}", "y1": f"{y}", "y2": f"{y}", "stroke-width": "0.6"}
+        ET.SubElement(root, "line", line | _stroke(number))
         text = ET.SubElement(root, "text", {"x": f"{_MARGIN_MM + 23}", "y": f"{y + 1.5}", "font-size": "4.5"})
         text.text = fabric
     tall = legend + height + 2 * _MARGIN_MM
@@ -86,8 +87,8 @@ def write_overlay_picture(path: str | os.PathLike[str], comparison: Comparison) 
         InputError: the file cannot be written.
     """
     rows = len(comparison.pieces)
-    figure = new_figure(13.0, 6.6 * rows + 0.9, dpi=110)
-    grid = figure.add_gridspec(rows * _CLOSE_UPS, 2, width_ratios=(2.6, 1.0), hspace=0.35, wspace=0.05)
+    figure = new_figure(10.0, 6.2 * rows + 0.6, dpi=110, layout="constrained")
+    grid = figure.add_gridspec(rows * _CLOSE_UPS, 2, width_ratios=(2.2, 1.0))
     for row, piece in enumerate(comparison.pieces):
         whole = figure.add_subplot(grid[row * _CLOSE_UPS : (row + 1) * _CLOSE_UPS, 0])
         _draw_outlines(whole, comparison, piece, width=1.4)
@@ -108,36 +109,33 @@ def write_overlay_picture(path: str | os.PathLike[str], comparison: Comparison) 
             close = figure.add_subplot(grid[row * _CLOSE_UPS + number, 1])
             _draw_outlines(close, comparison, piece, width=1.8)
             reach = max(2.0 * apart, 0.004)
-            close.set_xlim(at[0] - 1.6 * reach, at[0] + 1.6 * reach)
-            close.set_ylim(at[1] - reach, at[1] + reach)
-            close.set_xticks([])
-            close.set_yticks([])
+            left, low = at - np.multiply(reach, [1.6, 1.0])
+            close.set(xlim=(left, left + 3.2 * reach), ylim=(low, low + 2.0 * reach), xticks=[], yticks=[])
             length = 10.0 ** np.floor(np.log10(1.6 * reach))
-            _draw_length(close, at[0] - 1.5 * reach, at[1] - 0.9 * reach, length, f"{1e3 * length:g} mm")
-            close.set_title(f"{label}: {1e3 * apart:.1f} mm", fontsize=10)
+            _draw_length(close, left + 0.1 * reach, low + 0.1 * reach, length, f"{1e3 * length:g} mm")
+            close.set_title(f"{label}: {1e3 * apart:.1f} mm", fontsize=9, wrap=True)
             whole.plot(*at, "o", mfc="none", mec="#555555", ms=11)
             whole.annotate(str(number + 1), at, xytext=(9, 6), textcoords="offset points", color="#555555", fontsize=10)
             close.text(0.03, 0.9, str(number + 1), transform=close.transAxes, color="#555555", fontsize=11)
         whole.set_axis_off()
         most = {fabric: 1e3 * d["outline, most"] for fabric, d in comparison.distances(piece).items()}
         words = ", ".join(f"{fabric} {mm:.1f} mm" for fabric, mm in most.items())
-        whole.set_title(f"{piece}: outline apart by at most {words}", fontsize=11, loc="left")
+        whole.set_title(fill(f"{piece}: outline apart by at most {words}", 75), fontsize=11, loc="left")
         low, high = whole.get_xlim()[0], whole.get_ylim()[0]
         length = 0.1 if whole.get_xlim()[1] - low > 0.25 else 0.02
         _draw_length(whole, low, high, length, f"{100 * length:.0f} cm")
     handles = []
     for colour, dashes in map(_style, range(len(comparison.fabrics))):
-        handles.append(Line2D([], [], color=colour, linestyle=(0, dashes) if dashes else "-", linewidth=1.6))
+        handles.append(Line2D([], [], color=colour, linestyle=(0, dashes), linewidth=1.6))
     figure.legend(
         handles,
         [f"{fabric} (compared with)" if k == 0 else fabric for k, fabric in enumerate(comparison.fabrics)],
-        loc="upper center",
-        ncols=min(len(comparison.fabrics), 6),
+        loc="outside upper center",
+        ncols=min(len(comparison.fabrics), 3),
         frameon=False,
         fontsize=11,
     )
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, format="png", bbox_inches="tight", metadata={"Software": "warpflat"})
+    write_figure(path, figure)
 
 
 def _draw_length(axis: Axes, x: float, y: float, length: float, words: str) -> None:
@@ -149,5 +147,5 @@ def _draw_outlines(axis: Axes, comparison: Comparison, piece: str, *, width: flo
     for number, fabric in enumerate(comparison.fabrics):
         colour, dashes = _style(number)
         for loop in outline(comparison.results[fabric][piece], comparison.layouts[fabric][piece]):
-            axis.plot(*loop.T, color=colour, linewidth=width, linestyle=(0, dashes) if dashes else "-")
+            axis.plot(*loop.T, color=colour, linewidth=width, linestyle=(0, dashes))
     axis.set_aspect("equal")

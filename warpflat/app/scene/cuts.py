@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from warpflat.app.scene.load import Scene, errors_named, make_scene
-from warpflat.app.scene.schema import AutoCutTable, CutTable
+from warpflat.app.scene.schema import CutTable
 from warpflat.core import InputError, IntArray, find_unused_name, quote_value
 from warpflat.garment import Form, FormDart, Mannequin, part_pieces, taken_over
 
 if TYPE_CHECKING:
-    from warpflat.flat import AutoCut, CutPlan, Flattening, RelaxOptions, Surface
+    from warpflat.flat import AutoCutTable, CutPlan, Flattening, RelaxOptions, Surface
 
 __all__ = [
     "CutSequence",
@@ -42,7 +42,7 @@ class CutSequence:
 
     surface: Surface
     plans: tuple[CutPlan, ...] = ()
-    auto: AutoCut | None = None
+    auto: AutoCutTable | None = None
     first_auto: int = 0
     notes: tuple[str, ...] = ()
 
@@ -135,7 +135,7 @@ def plan_cuts(surface: Surface, tables: Sequence[CutTable]) -> CutSequence:
 
 def plan_automatic_cuts(
     sequence: CutSequence,
-    table: AutoCutTable,
+    auto: AutoCutTable,
     *,
     flatten: Callable[[Surface, RelaxOptions], Flattening],
     relax: RelaxOptions,
@@ -144,7 +144,7 @@ def plan_automatic_cuts(
 
     Args:
         sequence: what is cut before.
-        table: the settings.
+        auto: the settings.
         flatten: flattens a surface with the scene's other settings.
         relax: the scene's options.
 
@@ -155,11 +155,10 @@ def plan_automatic_cuts(
         InputError: a cut that is made before is refused.
     """
     from warpflat.core import InputError
-    from warpflat.flat import AutoCut, CutPlan, coarse_options, cut_automatically
+    from warpflat.flat import CutPlan, coarse_options, cut_automatically
 
-    auto = AutoCut(**table.model_dump())
     # Energies are a little higher while the relaxation is coarse: whether a cut is needed is for the full one to say.
-    search = replace(auto, stop_below=0.0, stop_below_strain=0.0)
+    search = auto.model_copy(update={"stop_below": 0.0, "stop_below_strain": 0.0})
     result = flatten_and_cut(sequence, flatten=flatten, relax=coarse_options(relax))
     why = "none would release energy without overlapping"
     try:
@@ -250,20 +249,9 @@ def place_of(cut: Mapping[str, Any]) -> tuple[str | None, ...]:
 
 
 def _dart(table: CutTable) -> FormDart:
-    return FormDart(
-        name=table.name or f"{table.line}".removesuffix(" left").removesuffix(" right"),
-        piece=table.piece or "",
-        line=table.line or "",
-        at=table.at,
-        towards=table.towards,
-        between=table.between,
-        part=None if table.part is None else (table.part[0], table.part[1]),
-        tip_mm=table.tip_mm,
-        mirrored=table.mirrored,
-        mouth_mm=table.mouth_mm,
-        like=table.like,
-        pleat_mm=table.pleat_mm,
-    )
+    keys: dict[str, Any] = {field.name: getattr(table, field.name) for field in fields(FormDart)}
+    keys["name"] = table.name or f"{table.line}".removesuffix(" left").removesuffix(" right")
+    return FormDart(**keys | {"part": table.part and (table.part[0], table.part[1])})
 
 
 def omitted(dart: FormDart, **more: str) -> dict[str, Any]:
@@ -279,17 +267,9 @@ def asked_cuts(scene: Scene) -> list[dict[str, Any]]:
 
 def cut_of_dart(dart: FormDart) -> dict[str, Any]:
     """Return the table of `[[cuts]]` that asks for a dart; what is the default anyway is left out."""
-    keys: dict[str, Any] = {"name": dart.name, "piece": dart.piece, "line": dart.line}
-    for key in ("at", "towards", "tip_mm", "mouth_mm", "like", "pleat_mm"):
-        if getattr(dart, key) is not None:
-            keys[key] = getattr(dart, key)
-    if dart.towards is not None:
-        keys["between"] = dart.between
-    if dart.part is not None:
-        keys["part"] = list(dart.part)
-    if not dart.mirrored:
-        keys["mirrored"] = False
-    return keys
+    usual = {"mirrored": True} | ({"between": dart.between} if dart.towards is None else {})
+    keys = {key: value for key, value in asdict(dart).items() if value is not None and value != usual.get(key)}
+    return keys if dart.part is None else {**keys, "part": list(dart.part)}
 
 
 def scene_with(scene: Scene, **tables: Any) -> Scene:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpflat.app.scene.load import Scene, errors_named
+from warpflat.app.scene.load import Scene, errors_named, fabric_of_correction
 from warpflat.app.scene.schema import DrapeTable
 from warpflat.core import report_activity
 from warpflat.garment import Garment, garment_files
@@ -41,7 +41,7 @@ def _corrected_formats(scene: Scene) -> list[str]:
 
 def write_drape(
     scene: Scene, garment: Garment, folder: Path, *, device: str | None = None
-) -> tuple[dict[str, Any], list[str]]:
+) -> tuple[dict[str, Any], list[str], tuple[str, ...]]:
     """Drape a scene's garment, and write its files.
 
     Args:
@@ -51,7 +51,7 @@ def write_drape(
         device: Warp device.
 
     Returns:
-        The entries of `metrics.json`, and the names of the files.
+        The entries of `metrics.json`, the names of the files, and notes on the corrected pattern.
 
     Raises:
         InputError: an unknown line, or the folder cannot be written.
@@ -63,21 +63,20 @@ def write_drape(
     table = scene.settings.drape
     assert table is not None
     files = write_drape_files(draped, folder, picture=output.picture, frames=output.frames > 0, usd=table.usd)
-    metrics = {"drape": draped.measures()}
+    metrics, notes = {"drape": draped.measures()}, tuple[str, ...]()
     if table.correct or table.correct_fabric is not None:
         # Correct the pattern, and write it beside the first.
         from warpflat.app.scene.pattern_options import pattern_options
         from warpflat.core import optional_file
-        from warpflat.flat import find_fabric
         from warpflat.garment import correct_pattern
 
         report_activity("correcting the pattern")
         with errors_named(scene.where):
-            other = None if table.correct_fabric is None else find_fabric(table.correct_fabric)
+            other = fabric_of_correction(scene)
             found = correct_pattern(
                 draped, hold=[*table.hold, *draped.threaded], fabric=other, worn_shape=other is not None
             )
-            drawing = pattern_options(scene.settings.pattern, None)
+            drawing = pattern_options(scene.settings.pattern, None, scene.settings.cloth)
         if output.picture:
             with optional_file(folder / "corrected.png", files) as path:
                 from warpflat.garment import write_correction_picture
@@ -85,11 +84,12 @@ def write_drape(
                 write_correction_picture(path, found)
         corrected = found.apply(garment)
         assert isinstance(corrected, Garment)
-        drawing = replace(drawing, formats=_corrected_formats(scene), cloth=None)
+        drawing = replace(drawing, formats=_corrected_formats(scene))
         written = garment_files({"": corrected}, folder, name=f"{scene.name}.corrected", options=drawing)
         metrics["drape"]["correction"] = found.measures(garment)
         files += written.files
-    return metrics, files
+        notes = written.notes
+    return metrics, files, notes
 
 
 def drape_scene(scene: Scene, garment: Garment | Flattening, *, device: str | None = None) -> Drape:

@@ -64,7 +64,7 @@ _AS_WORN = 0.1
 # Ease is from and to these [m].
 _RANGE = -0.3, 4.0
 #: Axes of a garment's front, and how it is turned to face +Z.
-_FRONTS = {"+z": (1.0, 0.0), "-z": (-1.0, 0.0), "+x": (0.0, -1.0), "-x": (0.0, 1.0)}
+_FRONTS = {"+z": (1.0, 0.0), "-z": (-1.0, 0.0), "+x": (0.0, 1.0), "-x": (0.0, -1.0)}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from warpflat.app.scene.cuts import cut_form
-from warpflat.app.scene.load import Scene, errors_named, expand_variables, scene_fabric
+from warpflat.app.scene.load import Scene, errors_named, scene_fabric
 from warpflat.app.scene.pulled_on import wide_enough
 from warpflat.garment import (
     Form,
@@ -60,7 +60,7 @@ def scene_mannequin(scene: Scene, *, size: str | None = None) -> Mannequin:
     assert table is not None  # the schema sees to it
     table = table if size is None else table.model_copy(update={"size": size})
     with errors_named(f"{scene.where}: {'mannequin' if size is None else 'pattern.sizes'}"):
-        return mannequin_from_table(table, path_of=lambda file: scene.folder / expand_variables(file))
+        return mannequin_from_table(table, path_of=scene.path)
 
 
 def scene_recipe(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mannequin, Form]:

@@ -10,7 +10,7 @@ from warpflat.app.scene.cuts import asked_cuts, omitted, place_of, scene_with
 from warpflat.app.scene.form import scene_recipe
 from warpflat.app.scene.ledger import candidate_cuts, trial_of_scene, try_cuts, with_cut
 from warpflat.app.scene.load import Scene
-from warpflat.flat import AutoCut, Flattening, LedgerEntry, RankedBy
+from warpflat.flat import Flattening, LedgerEntry, RankedBy
 from warpflat.garment import (
     ELBOW,
     NEAR_ARMHOLE,
@@ -40,7 +40,7 @@ def settle_shape(scene: Scene, *, device: str | None = None) -> tuple[Scene, tup
     if settings.mannequin is None or (settings.auto_cut is None and settings.shape != "auto"):
         return scene, ()
     if settings.auto_cut is not None:
-        auto = AutoCut(**settings.auto_cut.model_dump())
+        auto = settings.auto_cut
         cut, made = _cut(
             scene_with(scene, auto_cut=None), auto.is_enough, most=auto.max_cuts, by=auto.by, device=device
         )

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.app.scene.load import Scene, errors_named, expand_variables, scene_fabric
+from warpflat.app.scene.load import Scene, errors_named, scene_fabric
 from warpflat.app.scene.schema import FileSurface, FindSeamsTable, SeamCutTable
 from warpflat.app.scene.surface import scene_surface
 from warpflat.core import (
@@ -73,7 +73,7 @@ def found_seams(scene: Scene) -> FoundSeams | None:
     if all_parts and asked.find == "none":
         return None
     with errors_named(f"{scene.where}: surface.file"):
-        path = scene.folder / expand_variables(table.file)
+        path = scene.path(table.file)
     try:
         read = read_garment(path, units=table.units, prim=table.prim, name=scene.name)
     except InputError:
@@ -121,7 +121,7 @@ def found_seams(scene: Scene) -> FoundSeams | None:
     waist = None
     if asked.body is not None:
         with errors_named(f"{scene.where}: find_seams.body"):
-            waist = waist_of_body(scene.folder / expand_variables(asked.body), read.scale)
+            waist = waist_of_body(scene.path(asked.body), read.scale)
         notes.append(f"a waist is looked for where the body of {Path(asked.body).name} has its own")
     with errors_named(scene.where):
         options = SeamOptions(
@@ -337,7 +337,7 @@ def _as_cuts(scene: Scene, number: int, table: SeamCutTable, marks: Sequence[Sea
     edges: Sequence[Sequence[int]] = ()
     if isinstance(table.edges, str):
         with errors_named(here):
-            path = scene.folder / expand_variables(table.edges)
+            path = scene.path(table.edges)
         with errors_named(f"{here}: edges"):
             edges = read_edges(path)
     elif table.edges is not None:
@@ -405,7 +405,7 @@ def plain_panel(scene: Scene) -> Surface | None:
         return None
     try:
         with errors_named(f"{scene.where}: surface.file"):
-            path = scene.folder / expand_variables(table.file)
+            path = scene.path(table.file)
         read = read_mesh_file(path, units=table.units, prim=table.prim, name=scene.name)
         surface = scene_surface(scene, read)
     except InputError:

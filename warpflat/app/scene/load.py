@@ -21,9 +21,11 @@ __all__ = [
     "Scene",
     "errors_named",
     "expand_variables",
+    "fabric_of_correction",
     "load_scene",
     "make_scene",
     "scene_fabric",
+    "scene_library",
     "scene_relax_options",
     "scene_wear",
 ]
@@ -48,6 +50,14 @@ class Scene:
     folder: Path
     where: str
     sources: tuple[Path, ...] = ()
+
+    def path(self, file: str) -> Path:
+        """Return where a file lies that the scene names; it may name environment variables.
+
+        Raises:
+            InputError: one of them is not set.
+        """
+        return self.folder / expand_variables(file)
 
     def allowing(self, shear_limit: float | None) -> Scene:
         """Return the scene with a limit of shear in place of its own [degrees]; itself for None."""
@@ -86,19 +96,28 @@ def make_scene(data: Mapping[str, Any], *, name: str, folder: Path, where: str) 
         InputError: as `load_scene`; it names no fabric, and its fabric files have several.
     """
     settings = check_table(SceneTable, data, where)
+    scene = Scene(name=settings.name or make_file_name(name), settings=settings, folder=folder, where=where)
     if settings.fabric_files and "fabric" not in settings.model_fields_set:
         # The only fabric of the user's files is meant.
-        with errors_named(f"{where}: fabric_files"):
-            library = load_library([folder / expand_variables(file) for file in settings.fabric_files])
-        shipped = load_library()
+        library, shipped = scene_library(scene), load_library()
         own = [name for name, fabric in library.items() if fabric is not shipped.get(name)]
         if len(own) > 1:
             raise InputError(f"{where}: fabric is not given, and the fabric files have several; {nearest('', own)}")
-        settings = settings.model_copy(update={"fabric": own[0]})
+        scene = replace(scene, settings=settings.model_copy(update={"fabric": own[0]}))
     if settings.name is not None:
         with errors_named(f"{where}: name"):
             check_file_name(settings.name)
-    return Scene(name=settings.name or make_file_name(name), settings=settings, folder=folder, where=where)
+    return scene
+
+
+def scene_library(scene: Scene) -> dict[str, Fabric]:
+    """Return the fabrics that a scene can name: those that come with the library, and those of its files.
+
+    Raises:
+        InputError: a file cannot be read, or has a wrong value.
+    """
+    with errors_named(f"{scene.where}: fabric_files"):
+        return load_library([scene.path(file) for file in scene.settings.fabric_files])
 
 
 def scene_fabric(scene: Scene) -> Fabric:
@@ -107,9 +126,7 @@ def scene_fabric(scene: Scene) -> Fabric:
     Raises:
         InputError: an unknown name (names the nearest), or impossible values.
     """
-    settings = scene.settings
-    with errors_named(f"{scene.where}: fabric_files"):
-        library = load_library([scene.folder / expand_variables(file) for file in settings.fabric_files])
+    settings, library = scene.settings, scene_library(scene)
     if isinstance(settings.fabric, FabricTable):
         fabric = fabric_from_table(scene.name, settings.fabric, where=scene.where, library=library)
     else:
@@ -117,6 +134,19 @@ def scene_fabric(scene: Scene) -> Fabric:
             fabric = find_fabric(settings.fabric, library)
     with errors_named(f"{scene.where}: shear_limit"):
         return fabric.allowing(settings.shear_limit)
+
+
+def fabric_of_correction(scene: Scene) -> Fabric | None:
+    """Return the other cloth of the scene's corrected pattern; None if the scene names none.
+
+    Raises:
+        InputError: an unknown name (names the nearest).
+    """
+    table = scene.settings.drape
+    if table is None or table.correct_fabric is None:
+        return None
+    with errors_named(f"{scene.where}: drape.correct_fabric"):
+        return find_fabric(table.correct_fabric, scene_library(scene))
 
 
 def scene_wear(scene: Scene) -> Wear | None:

@@ -130,6 +130,11 @@ class OutsideJob:
         sources: list[Path] = []
         with listening_to_reads(sources.append):
             table = SewingTable() if sewing is None else check_table(SewingTable, read_toml(sewing), str(sewing))
+            if sewing is not None and table.mannequin is not None and table.mannequin.scan is not None:
+                with errors_named(f"{sewing}: mannequin.scan"):
+                    scan = str(sewing.parent / expand_variables(table.mannequin.scan))
+                body_of_file = table.mannequin.model_copy(update={"scan": scan})
+                table = table.model_copy(update={"mannequin": body_of_file})
             pattern, lifts, run = _read(path, table, units)
             run_body = run.mannequin.table
             with errors_named(str(sewing)):
@@ -270,6 +275,8 @@ def _asked(given: str | None, table: SewingTable) -> MannequinTable | None:
     """Return the body that --body or the sewing file names."""
     if given is None:
         return table.mannequin
+    with errors_named("--body"):
+        given = expand_variables(given)
     return check_table(MannequinTable, {"scan" if Path(given).suffix else "size": given}, "--body")
 
 
@@ -289,7 +296,7 @@ def _worn_scan(
         return None
     kept = asked.model_copy(update={"pose": "scan", "symmetric": False})
     try:
-        body = mannequin_from_table(kept, path_of=lambda file: Path(expand_variables(file)))
+        body = mannequin_from_table(kept, path_of=Path)
     except InputError:
         # The body as it is asked for may be one; if not, it says why.
         return None
@@ -328,7 +335,7 @@ def _body(
     else:
         raise InputError(f'{path}: says nothing of a body; give --body "EU 38" or --body SCAN.obj')
     with errors_named("--body" if given is not None else "mannequin"):
-        return mannequin_from_table(found, path_of=lambda file: Path(expand_variables(file)))
+        return mannequin_from_table(found, path_of=Path)
 
 
 def drape_outside(

@@ -1,11 +1,8 @@
-"""Pattern options of a scene: its tables `pattern` and `marker`."""
+"""Pattern options of a scene: its tables `pattern`, `marker` and `cloth`."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from warpflat.app.scene.schema import ClothTable, MarkerTable, PatternTable
+from warpflat.app.scene.schema import ClothTable, MarkerTable, PatternTable
 from warpflat.pattern import EdgeRules, PatternOptions, Shrinkage, language_words
 
 __all__ = ["pattern_options"]
@@ -21,17 +18,12 @@ def pattern_options(
     """
     from warpflat.pattern import Cloth, Stripes
 
-    cloth = None
+    cloth, cut_from = None, cut_from or ClothTable()
     if marker is not None:
-        stripes = Stripes()
-        if cut_from is not None:
-            stripes = Stripes(
-                warp=cut_from.repeat_warp_mm / 1000, weft=cut_from.repeat_weft_mm / 1000, seams=tuple(cut_from.match)
-            )
-        cloth = Cloth(
-            width=marker.width, one_way=marker.one_way, reversible=marker.reversible, gap=marker.gap, folded=marker.folded,
-            stripes=stripes,
-        )  # fmt: skip
+        stripes = Stripes(
+            warp=cut_from.repeat_warp_mm / 1000, weft=cut_from.repeat_weft_mm / 1000, seams=tuple(cut_from.match)
+        )
+        cloth = Cloth(**marker.model_dump(exclude={"seconds"}), stripes=stripes)
     return PatternOptions(
         formats=tuple(table.formats),
         dialect=table.dialect,
@@ -48,10 +40,8 @@ def pattern_options(
         names=table.names,
         words={**language_words(table.language), **table.words},
         marker_seconds=5 if marker is None else marker.seconds,
-        shrinkage=Shrinkage()
-        if cut_from is None
-        else Shrinkage(warp=cut_from.shrinkage_warp, weft=cut_from.shrinkage_weft),
-        lining="" if cut_from is None else cut_from.lining,
-        interfacing="" if cut_from is None else cut_from.interfacing,
-        pocketing="" if cut_from is None else cut_from.pocketing,
+        shrinkage=Shrinkage(warp=cut_from.shrinkage_warp, weft=cut_from.shrinkage_weft),
+        lining=cut_from.lining,
+        interfacing=cut_from.interfacing,
+        pocketing=cut_from.pocketing,
     )

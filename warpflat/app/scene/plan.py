@@ -12,7 +12,14 @@ from warpflat.app.scene.cuts import CutSequence, cut_of_dart, plan_automatic_cut
 from warpflat.app.scene.form import scene_form, scene_mannequin
 from warpflat.app.scene.found_seams import found_seams, plain_panel, seams_entry
 from warpflat.app.scene.frames import FrameRecorder
-from warpflat.app.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
+from warpflat.app.scene.load import (
+    Scene,
+    errors_named,
+    fabric_of_correction,
+    scene_fabric,
+    scene_relax_options,
+    scene_wear,
+)
 from warpflat.app.scene.pattern_options import pattern_options
 from warpflat.app.scene.schema import PieceTable
 from warpflat.app.scene.seams import scene_constraints, scene_surface_seams, scene_wishes
@@ -34,7 +41,6 @@ from warpflat.flat import (
 from warpflat.garment import (
     CURVES_MM,
     GRAIN,
-    BorderSeam,
     Constraint,
     FormGarment,
     FormResult,
@@ -42,6 +48,7 @@ from warpflat.garment import (
     Garment,
     Mannequin,
     OpeningTable,
+    SeamTable,
     SeamWish,
     SewnPanel,
     cap_wishes,
@@ -173,7 +180,7 @@ class MeshPlan(Plan):
     """
 
     sequences: Sequence[CutSequence]
-    seams: Sequence[BorderSeam] = ()
+    seams: Sequence[SeamTable] = ()
     panels: Sequence[SewnPanel] = ()
 
     @property
@@ -394,6 +401,7 @@ def plan_scene(
     Raises:
         InputError: the source, a line, a cut, the fabric, a seam or a setting is wrong.
     """
+    fabric_of_correction(scene)  # a mistake is reported before anything is made
     if scene.settings.mannequin is None:
         return plan_mesh(scene, device=device, cuts=cuts)
     return plan_garment(scene, device=device, built=built)
@@ -501,7 +509,7 @@ def flatten_surface(
         from warpflat.app.scene.read_layout import read_layout
 
         with errors_named(f"{scene.where}: start"):
-            start = read_layout(scene.folder / expand_variables(settings.start))
+            start = read_layout(scene.path(settings.start))
     options = {**flatten_options(scene, device), "relax": relax}
     return flatten(surface, datum=settings.datum, start=start, callback=callback, **options)
 

@@ -31,7 +31,7 @@ from warpflat.core import (
     report_activity,
     require_memory_for_run,
 )
-from warpflat.flat import Progress, Remedy, Surface, judge, size_words
+from warpflat.flat import Progress, Remedy, Surface, extent_words, judge
 from warpflat.garment import (
     FormResult,
     Garment,
@@ -182,11 +182,12 @@ def _run(
 
         files = list(film.files)
         draped: dict[str, Any] = {}
+        drape_notes: tuple[str, ...] = ()
         if settings.drape is not None:
             measured, fit_notes, remedies, worn = fit.result()
             garment = garment.advised(lambda part: part.with_remedies(remedies[part.surface.name]))
             with optional_step("it was not draped", of=StepError):
-                draped, drape_files = write_drape(scene, garment, folder, device=device)
+                draped, drape_files, drape_notes = write_drape(scene, garment, folder, device=device)
                 files = list(dict.fromkeys([*drape_files, *files]))
                 sizes[plan.size] = replace(sizes[plan.size], drape=draped["drape"])
         # What is ready is packed for the review while other processes write.
@@ -220,11 +221,11 @@ def _run(
     name_notes = note_on_names(garment.parts) if output.picture else ()
     size = ""
     if isinstance(settings.surface, FileSurface):
-        size = size_words(np.concatenate([surface.vertices for surface in plan.surfaces]), settings.surface.units)
+        size = extent_words(np.concatenate([surface.vertices for surface in plan.surfaces]), settings.surface.units)
     return SceneResult(
         metrics=metrics,
         files=tuple(files),
-        notes=(*notes, *fit_notes, *written.notes, *name_notes, *manifest_notes),
+        notes=tuple(dict.fromkeys((*notes, *fit_notes, *written.notes, *drape_notes, *name_notes, *manifest_notes))),
         size=size,
     )
 

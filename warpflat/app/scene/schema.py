@@ -18,14 +18,14 @@ from pydantic import (
 
 from warpflat.app.scene.first_shapes import PIECES
 from warpflat.core import Table, is_number, plain_name, quote_value
-from warpflat.flat import DEFAULT_FABRIC, FORMER_SOLVERS, FabricTable, RelaxOptions, Solver
-from warpflat.garment import FinishingTable, MannequinTable, OpeningTable, PocketTable
+from warpflat.flat import DEFAULT_FABRIC, FORMER_SOLVERS, AutoCutTable, FabricTable, RelaxOptions, Solver
+from warpflat.garment import Direction, FinishingTable, FormDart, MannequinTable, OpeningTable, PocketTable, SeamTable
 
 if TYPE_CHECKING:
     from warpflat.garment import DrapeOptions
 
 __all__ = [
-    "AutoCutTable",
+    "PATH_KEYS",
     "BorderTable",
     "ClothTable",
     "ConstraintTable",
@@ -39,7 +39,6 @@ __all__ = [
     "PieceTable",
     "SceneTable",
     "SeamCutTable",
-    "SeamTable",
     "ShapeSurface",
     "kind_of_surface",
 ]
@@ -146,19 +145,8 @@ class CutTable(Table):
 
     def check_for_surface(self, where: str) -> None:
         """Refuse what only a dart in a form has."""
-        given = self.model_fields_set & {
-            "piece",
-            "towards",
-            "between",
-            "tip_mm",
-            "mouth_mm",
-            "like",
-            "pleat_mm",
-            "at",
-            "omit",
-            "mirrored",
-        }
-        if given:
+        of_darts = {"omit", *(field.name for field in dataclasses.fields(FormDart))} - {"name", "line", "part"}
+        if given := self.model_fields_set & of_darts:
             raise ValueError(f"{where}: {sorted(given)[0]} belongs to a form's darts; leave it out on a [surface]")
 
     @model_validator(mode="after")
@@ -176,26 +164,12 @@ class CutTable(Table):
         return self
 
 
-class AutoCutTable(Table):
-    """Cutting by itself: the best of all candidates, again and again until it is enough (see `warpflat cuts`)."""
-
-    max_cuts: Annotated[int, Field(ge=1, le=20)] = 2
-    """At most so many; a mirrored pair counts as one."""
-    stop_below: Annotated[float, Field(ge=0.0)] = 0.0
-    """A piece of at most this model energy needs no further cut [J]."""
-    stop_below_strain: Annotated[float, Field(ge=0.0)] = 0.0
-    """A piece of which 98 % is strained by at most this share along warp and weft, as worn, needs no further cut."""
-    by: Literal["released", "per_cm"] = "released"
-    """What makes a cut the best: the energy it releases in all, or per centimetre."""
-
-
 def _as_component(value: Any) -> Any:
     if value not in ("largest", "all") and not (is_number(value, whole=True) and value >= 0):
         raise ValueError(f'should be "largest", "all" or a number from 0, largest first; got {quote_value(value)}')
     return value
 
 
-Direction = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Component = Annotated[Literal["largest", "all"] | int, BeforeValidator(_as_component)]
 
 
@@ -276,31 +250,6 @@ class PieceTable(Table):
     """Angle from the datum to the warp, counter-clockwise; that of the scene if not given."""
     lines: dict[str, LineTable] = Field(default_factory=dict)
     cuts: list[CutTable] = Field(default_factory=list)
-
-
-class SeamTable(Table):
-    """A seam: on a form one of those that it has, on a [surface] two lines along its border that are sewn together.
-
-    A form's seam is named as in the pattern, and one side is longer than the other. On a [surface] `sides` names the two lines,
-    as "left" or "piece.left"; they may be equally long.
-
-    `fullness` is eased in near the seam (0.02 is 2 %), at a sleeve's cap above its notches only. `gather` is the ratio of the
-    lengths, and its fullness falls on through the piece. `longer` names the piece, "piece.edge" or line that is longer; the
-    seam's second side if not given.
-    """
-
-    name: str = Field(min_length=1)
-    sides: Annotated[list[str], Field(min_length=2, max_length=2)] | None = None
-    fullness: Annotated[float, Field(ge=0, le=0.3)] | None = None
-    gather: Annotated[float, Field(ge=1, le=5)] | None = None
-    longer: str | None = None
-
-    @model_validator(mode="after")
-    def _one_way(self) -> SeamTable:
-        given = (self.fullness is not None) + (self.gather is not None)
-        if given > 1 or (given == 0 and self.sides is None):
-            raise ValueError("give either fullness = 0.02 (2 %, eased in) or gather = 1.5 (times as long)")
-        return self
 
 
 class FindSeamsTable(Table):
@@ -502,6 +451,11 @@ else:
     RelaxTable = create_model("RelaxTable", __base__=Table, **_RELAX_FIELDS)
 
 
+#: Keys of a scene under which files are named, from table to table; some have other values, too.
+PATH_KEYS = (
+    ("start",), ("fabric_files",), ("surface", "file"), ("mannequin", "scan"), ("seams", "body"), ("find_seams", "body"),
+    ("seams_cut", "edges"),
+)  # fmt: skip
 # Keys of a scene that change the pattern of a mesh.
 _CHANGES_PATTERN = (
     "lines", "cuts", "auto_cut", "pieces", "seams", "find_seams", "seams_cut", "constraints", "datum", "start", "grain_angle", "bands",

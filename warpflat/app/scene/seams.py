@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
-from warpflat.app.scene.schema import ConstraintTable, SeamTable
+from warpflat.app.scene.schema import ConstraintTable
 from warpflat.core import InputError, nearest
-from warpflat.garment import BorderSeam, Constraint, FixedLength, SeamWish, Straight, Symmetric
+from warpflat.garment import Constraint, FixedLength, SeamTable, SeamWish, Straight, Symmetric
 
 __all__ = ["scene_constraints", "scene_surface_seams", "scene_wishes"]
 
@@ -14,19 +14,13 @@ __all__ = ["scene_constraints", "scene_surface_seams", "scene_wishes"]
 def scene_wishes(tables: Sequence[SeamTable]) -> list[SeamWish]:
     """Return the fullness and gathers that a scene wants of a form's seams."""
     return [
-        SeamWish(
-            name=table.name,
-            factor=table.gather if table.gather is not None else 1.0 + (table.fullness or 0.0),
-            gathered=table.gather is not None,
-            longer=table.longer,
-            upper=True,
-        )
+        SeamWish(name=table.name, factor=table.factor, gathered=table.gathered, longer=table.longer, upper=True)
         for table in tables
     ]
 
 
-def scene_surface_seams(tables: Sequence[SeamTable], piece: str) -> list[BorderSeam]:
-    """Return the seams that a scene names on its surface.
+def scene_surface_seams(tables: Sequence[SeamTable], piece: str) -> list[SeamTable]:
+    """Return the seams that a scene names on its surface, checked, with its lines by their names on the piece.
 
     Args:
         tables: of the scene, each with its sides.
@@ -35,7 +29,7 @@ def scene_surface_seams(tables: Sequence[SeamTable], piece: str) -> list[BorderS
     Raises:
         InputError: a name occurs twice, both sides are one line, or `longer` is neither of them.
     """
-    seams: list[BorderSeam] = []
+    seams: list[SeamTable] = []
     for number, table in enumerate(tables):
         where = f"seams[{number}]"
         first, second = (side.removeprefix(f"{piece}.") for side in table.sides or ["", ""])
@@ -46,15 +40,7 @@ def scene_surface_seams(tables: Sequence[SeamTable], piece: str) -> list[BorderS
         longer = second if table.longer is None else table.longer.removeprefix(f"{piece}.")
         if longer not in (first, second):
             raise InputError(f"{where}: longer is {longer!r}, not one of its sides; {nearest(longer, (first, second))}")
-        seams.append(
-            BorderSeam(
-                name=table.name,
-                sides=(first, second),
-                factor=table.gather if table.gather is not None else 1.0 + (table.fullness or 0.0),
-                gathered=table.gather is not None,
-                longer=(first, second).index(longer),
-            )
-        )
+        seams.append(table.model_copy(update={"sides": [first, second], "longer": longer}))
     return seams
 
 

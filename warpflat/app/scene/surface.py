@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from warpflat.app.scene.border import SIDES, line_on_border
-from warpflat.app.scene.load import Scene, errors_named, expand_variables
+from warpflat.app.scene.load import Scene, errors_named
 from warpflat.app.scene.schema import (
     BorderTable,
     FileSurface,
@@ -63,7 +63,7 @@ def scene_surface(scene: Scene, read: tuple[Path, RawMesh, float, list[Path]] | 
     wanted = {} if scene.settings.datum is None else {"datum": scene.settings.datum}
     wanted |= {f"constraints[{i}]": constraint.line for i, constraint in enumerate(scene.settings.constraints)}
     named = scene_surface_seams(scene.settings.seams, scene.name)
-    wanted |= {f"seams[{i}].sides[{k}]": seam.sides[k] for i, seam in enumerate(named) for k in (0, 1)}
+    wanted |= {f"seams[{i}].sides[{k}]": seam.lines[k] for i, seam in enumerate(named) for k in (0, 1)}
     surface = _with_table_lines(surface, scene.settings.lines, wanted, where=f"{scene.where}: ")
     with errors_named(f"{scene.where}: seams"):
         surface_seams(surface, named)
@@ -145,7 +145,7 @@ def scene_sewn_panels(scene: Scene) -> list[SewnPanel]:
 
 def _file(scene: Scene, table: FileSurface) -> Path:
     with errors_named(f"{scene.where}: surface.file"):
-        path = scene.folder / expand_variables(table.file)
+        path = scene.path(table.file)
         with guarded(path, "mesh", missing="does not exist"):
             path.stat()
     return path

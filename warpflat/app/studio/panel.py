@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from html import escape
-from typing import Any
+from typing import Any, get_args
 from urllib.parse import quote
 
+from warpflat.app.scene.load import scene_library
+from warpflat.app.scene.schema import SceneTable
 from warpflat.app.studio.maps import MAPS, MapScale
 from warpflat.app.studio.save import Saved
 from warpflat.app.studio.session import Preview, Session
@@ -18,7 +20,7 @@ from warpflat.garment import EASE_PRESETS, form_names, size_names, size_tables
 __all__ = ["Panel", "preview_words"]
 
 _OWN = "(the scene's own)"
-_SHAPES = ("none", "darts", "princess", "auto")
+_SHAPES = get_args(SceneTable.model_fields["shape"].annotation)
 #: Measurements that are asked for, with their names on the page.
 _MEASURES = {"bust": "bust [cm]", "waist": "waist [cm]", "hip": "hip [cm]", "stature": "stature [cm]"}
 _NO_LINE = "(click a line)"
@@ -62,7 +64,7 @@ class Panel:
         scene = session.scene
         with self._gui.add_folder("Cloth"):
             try:
-                names = sorted(load_library([scene.folder / file for file in scene.settings.fabric_files]))
+                names = sorted(scene_library(scene))
             except InputError:
                 names = sorted(load_library())
             self._fabric = self._gui.add_dropdown("cloth", (_OWN, *names), initial_value=_OWN)

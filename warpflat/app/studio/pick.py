@@ -45,20 +45,14 @@ def pick_on_rays(
     best: tuple[float, str, int] | None = None
     for name, (vertices, faces) in pieces.items():
         triangles, _ = triangulate(faces)
-        # Where the ray meets each triangle (Moeller, Trumbore 1997).
+        # Where the ray meets each triangle: start + t ray = corner + u (second - corner) + v (third - corner).
         corners = vertices[triangles]
-        first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        across = np.cross(ray, second)
-        volume = np.einsum("ij,ij->i", first, across)
-        flat = np.abs(volume) < 1e-15
-        inverse = 1.0 / np.where(flat, 1.0, volume)
-        to_corner = start - corners[:, 0]
-        u = np.einsum("ij,ij->i", to_corner, across) * inverse
-        turned = np.cross(to_corner, first)
-        v = turned @ ray * inverse
-        distance = np.einsum("ij,ij->i", second, turned) * inverse
-        meets = ~flat & (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9) & (distance > 0.0)
-        distance = np.where(meets, distance, np.inf)
+        sides = np.stack(
+            [np.broadcast_to(-ray, (len(corners), 3)), *(corners[:, 1:] - corners[:, :1]).swapaxes(0, 1)], -1
+        )
+        met, distance = np.abs(np.linalg.det(sides)) >= 1e-15, np.full(len(corners), np.inf)
+        t, u, v = np.linalg.solve(sides[met], (start - corners[met, 0])[:, :, None])[..., 0].T
+        distance[met] = np.where((u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9) & (t > 0.0), t, np.inf)
         number = int(np.argmin(distance))
         if distance[number] < (np.inf if best is None else best[0]):
             away = np.linalg.norm(corners[number] - (start + distance[number] * ray), axis=1)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from warpflat.app.review.faults import is_done
 from warpflat.app.scene.as_toml import document_as_toml
 from warpflat.app.scene.load import Scene, load_scene
 from warpflat.app.scene.run import run_scene
@@ -39,8 +40,8 @@ class Saved:
 
     @property
     def at_rest(self) -> bool:
-        """Whether every piece is."""
-        return all(piece["converged"] for piece in self.metrics["pieces"].values())
+        """Whether the run is without faults."""
+        return is_done(self.metrics)
 
 
 def scene_file(scene: Scene, name: str) -> Path:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.core.short_repr import short_repr
+from warpflat.flat.cutting.auto_cut import AutoCutTable, RankedBy
 from warpflat.flat.cutting.candidates import Candidate, find_candidates, peaks_in_words
 from warpflat.flat.cutting.crack import Price
 from warpflat.flat.cutting.cut_piece import cut
@@ -27,17 +28,14 @@ from warpflat.flat.solver.options import RelaxOptions, coarse_options
 __all__ = [
     "LEAST_MOUTH",
     "TRIED",
-    "AutoCut",
     "Ledger",
     "LedgerEntry",
-    "RankedBy",
     "best_of_few",
     "cut_automatically",
     "evaluate",
     "make_ledger",
 ]
 
-RankedBy = Literal["per_cm", "released"]
 
 # So many cuts are tried for a ledger.
 _LISTED = 8
@@ -338,39 +336,8 @@ def evaluate(result: Flattening, candidate: Candidate, *, relax: RelaxOptions) -
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class AutoCut:
-    """The settings of automatic cutting.
-
-    Attributes:
-        max_cuts: at most so many; a mirrored pair counts as one.
-        stop_below: a piece of at most this model energy (springs and guard) needs no further cut [J].
-        stop_below_strain: so does a piece of which 98 % of the cloth is strained by at most this share along warp and weft, as worn.
-        by: what the best cut is: "per_cm", or "released" in all.
-    """
-
-    max_cuts: int = 2
-    stop_below: float = 0.0
-    stop_below_strain: float = 0.0
-    by: RankedBy = "released"
-
-    def is_enough(self, result: Flattening) -> bool:
-        """Return whether a piece needs no further cut."""
-        return (
-            result.stages[-1].model_energy_j <= self.stop_below or worn_strain_level(result) <= self.stop_below_strain
-        )
-
-
-def worn_strain_level(result: Flattening) -> float:
-    """Return the absolute worn strain along warp or weft that 98 % of the area stays below."""
-    from warpflat.core.sums import weighted_percentile
-
-    strain = np.abs(result.worn.strain[:, :2]).max(axis=1)
-    return float(weighted_percentile(strain, result.worn.area, 0.98))
-
-
 def cut_automatically(
-    result: Flattening, auto: AutoCut, *, relax: RelaxOptions | None = None
+    result: Flattening, auto: AutoCutTable, *, relax: RelaxOptions | None = None
 ) -> tuple[Flattening, tuple[Ledger, ...]]:
     """Cut greedily: try the candidates that promise most, make the best that helps, and again until it is enough.
 

@@ -8,16 +8,16 @@ two such joints both sides stretch evenly.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest, project_on_segments
 from warpflat.flat import Surface, border_loops
+from warpflat.garment.construction.details import SeamTable
 from warpflat.garment.construction.sewn import Stitching
 
-__all__ = ["ONE_CURVE", "BorderSeam", "surface_seams"]
+__all__ = ["ONE_CURVE", "surface_seams"]
 
 #: Borders that keep this near [m] to each other in space are one curve.
 ONE_CURVE = 1e-3
@@ -27,31 +27,7 @@ _ALIKE, _AS_MANY = 0.01, 0.05
 _SAME_SHARE = 0.01
 
 
-@dataclass(frozen=True, kw_only=True)
-class BorderSeam:
-    """A wish that two lines along the border of a surface be sewn together.
-
-    Attributes:
-        name: of the seam.
-        sides: the two lines, by name.
-        factor: length of the longer side over that of the other: 1.02 for an ease of 2 %.
-        gathered: true if the fullness continues through the piece; false if it is eased in near the seam.
-        longer: the side that is longer, 0 or 1.
-    """
-
-    name: str
-    sides: tuple[str, str]
-    factor: float = 1.0
-    gathered: bool = False
-    longer: int = 1
-
-    @property
-    def ease(self) -> float:
-        """The surplus length of the second side, as a share of the first."""
-        return self.factor - 1.0 if self.longer == 1 else 1.0 / self.factor - 1.0
-
-
-def surface_seams(surface: Surface, named: Sequence[BorderSeam]) -> list[Stitching]:
+def surface_seams(surface: Surface, named: Sequence[SeamTable]) -> list[Stitching]:
     """Return the seams that are named on a surface, in their order, as they are to be sewn.
 
     Args:
@@ -67,11 +43,11 @@ def surface_seams(surface: Surface, named: Sequence[BorderSeam]) -> list[Stitchi
     found = []
     for seam in named:
         try:
-            sides = [_side(surface, along, line) for line in seam.sides]
+            sides = [_side(surface, along, line) for line in seam.lines]
             first, second = sides
             if len(np.intersect1d(first, second)) > 1:
                 raise InputError(
-                    f"lines {seam.sides[0]!r} and {seam.sides[1]!r} overlap; a side is sewn to another one"
+                    f"lines {seam.lines[0]!r} and {seam.lines[1]!r} overlap; a side is sewn to another one"
                 )
             one, other = surface.vertices[first], surface.vertices[second]
             # Two stretches of one border meet running against each other.
@@ -79,21 +55,21 @@ def surface_seams(surface: Surface, named: Sequence[BorderSeam]) -> list[Stitchi
             shared = max(_largest_distance(one, other), _largest_distance(other, one)) <= ONE_CURVE
             if shared and np.linalg.norm(one[0] - other[-1]) < np.linalg.norm(one[0] - other[0]):
                 raise InputError(
-                    f"{seam.sides[0]!r} and {seam.sides[1]!r} lie on each other the same way round, face to back; sides meet face to face"
+                    f"{seam.lines[0]!r} and {seam.lines[1]!r} lie on each other the same way round, face to back; sides meet face to face"
                 )
             arcs = [arc_lengths(points) for points in (one, other)]
             lengths = [float(arc[-1]) for arc in arcs]
             unlike = abs(lengths[0] - lengths[1]) / max(lengths)
             if not shared and unlike > (_AS_MANY if len(first) == len(second) else _ALIKE):
                 raise InputError(
-                    f"{seam.sides[0]!r} is {1e3 * lengths[0]:.1f} mm long and {seam.sides[1]!r} {1e3 * lengths[1]:.1f} mm, and they are "
+                    f"{seam.lines[0]!r} is {1e3 * lengths[0]:.1f} mm long and {seam.lines[1]!r} {1e3 * lengths[1]:.1f} mm, and they are "
                     f"not one curve in space; sides agree within {_ALIKE:.0%}, or {_AS_MANY:.0%} with as many vertices each"
                 )
             found.append(
                 Stitching(
                     name=seam.name, pieces=(surface.name, surface.name), vertices=(first, second), ratio=1.0 / (1.0 + seam.ease),
                     joints=_joints(arcs[0] / lengths[0], arcs[1] / lengths[1]),
-                    sides=(f"{surface.name}.{seam.sides[0]}", f"{surface.name}.{seam.sides[1]}"),
+                    sides=(f"{surface.name}.{seam.lines[0]}", f"{surface.name}.{seam.lines[1]}"),
                 )
             )  # fmt: skip
         except InputError as error:

@@ -31,6 +31,8 @@ __all__ = ["bust_depth", "button_depths", "buttonhole", "with_button_stand", "wi
 _BELOW, _LEFT_BELOW = 0.010, 0.6
 # A buttonhole is longer than the button is wide [m], and reaches so far beyond the centre, where the button's shank lies.
 _THICKNESS, _SHANK = 0.003, 0.003
+# Diameter of the small button on a cuff, a collar or a placket [m].
+_SMALL = 0.012
 # Half the length of the bars at the ends of a buttonhole [m].
 _BAR = 0.004
 # Allowance of the edge of a wrap, which is turned in twice [m], and the least of an edge that is left beside it.
@@ -175,15 +177,14 @@ def _with_sides(piece: Piece, name: str, new: Mapping[str, Sequence[Edge]]) -> P
     return with_edges(piece, {key: row if down else backwards(row) for key, row in new.items()})
 
 
-def buttonhole(centre: FloatArray, along: FloatArray, diameter: float = 0.012) -> dict[str, FloatArray]:
+def buttonhole(centre: FloatArray, along: FloatArray) -> dict[str, FloatArray]:
     """Return the lines of a buttonhole on a cuff, a collar or a waistband (2 by 2 [m] each), for a small button.
 
     Args:
         centre: its middle [m].
         along: its direction.
-        diameter: of the button [m].
     """
-    half, across = 0.5 * (diameter + _THICKNESS), np.array([-along[1], along[0]])
+    half, across = 0.5 * (_SMALL + _THICKNESS), np.array([-along[1], along[0]])
     ends = centre + np.outer([-half, half], along)
     bars = {f"buttonhole end {k}": end + np.outer([-_BAR, _BAR], across) for k, end in enumerate(ends, start=1)}
     return {"buttonhole": ends, **bars}

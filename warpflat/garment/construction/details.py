@@ -1,4 +1,4 @@
-"""Openings, finishing and pockets of a garment, as a scene file lists them."""
+"""Openings, finishing, pockets and seams of a garment, as a scene file lists them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from warpflat.core import Table, in_metres, other_side, without_side
 
-__all__ = ["FinishingTable", "OpeningTable", "PocketTable"]
+__all__ = ["FinishingTable", "OpeningTable", "PocketTable", "SeamTable"]
 
 # Widths that are not given [mm]: of openings, of finishing, and of collars in the middle of the back.
 _OPENING_MM = {"zip": 0.0, "slit": 15.0, "vent": 40.0, "buttons": 20.0, "keyhole": 12.0, "wrap": 120.0, "godet": 250.0}
@@ -286,4 +286,55 @@ class PocketTable(OfKind):
             raise ValueError(f'a {self.kind} pocket needs its piece: piece = "front"')
         if self.kind in ("inseam", "hip") and (not self.seam or self.below_mm < 0):
             raise ValueError(f'a pocket of kind {self.kind} needs its seam, seam = "side left", and below_mm from 0')
+        return self
+
+
+class SeamTable(Table):
+    """A seam: on a form one of those that it has, on a [surface] two lines along its border that are sewn together.
+
+    A form's seam is named as in the pattern, and one side is longer than the other. On a [surface] `sides` names the two lines,
+    as "left" or "piece.left"; they may be equally long.
+
+    `fullness` is eased in near the seam (0.02 is 2 %), at a sleeve's cap above its notches only. `gather` is the ratio of the
+    lengths, and its fullness falls on through the piece. `longer` names the piece, "piece.edge" or line that is longer; the
+    seam's second side if not given.
+    """
+
+    name: str = Field(min_length=1)
+    sides: Annotated[list[str], Field(min_length=2, max_length=2)] | None = None
+    fullness: Annotated[float, Field(ge=0, le=0.3)] | None = None
+    gather: Annotated[float, Field(ge=1, le=5)] | None = None
+    longer: str | None = None
+
+    @property
+    def factor(self) -> float:
+        """How many times as long the longer side is."""
+        return self.gather if self.gather is not None else 1.0 + (self.fullness or 0.0)
+
+    @property
+    def gathered(self) -> bool:
+        """Whether its fullness falls on through the piece."""
+        return self.gather is not None
+
+    @property
+    def lines(self) -> tuple[str, str]:
+        """The two lines on a surface."""
+        first, second = self.sides or ("", "")
+        return first, second
+
+    @property
+    def longer_line(self) -> int:
+        """Which of the two lines is longer, 0 or 1."""
+        return 1 if self.longer is None else self.lines.index(self.longer)
+
+    @property
+    def ease(self) -> float:
+        """The surplus length of the second line, as a share of the first."""
+        return self.factor - 1.0 if self.longer_line == 1 else 1.0 / self.factor - 1.0
+
+    @model_validator(mode="after")
+    def _one_way(self) -> SeamTable:
+        given = (self.fullness is not None) + (self.gather is not None)
+        if given > 1 or (given == 0 and self.sides is None):
+            raise ValueError("give either fullness = 0.02 (2 %, eased in) or gather = 1.5 (times as long)")
         return self

@@ -216,7 +216,7 @@ def _falling(wish: FinishingTable, chain: _Chain, columns: FloatArray, level: Fl
 def _collar(wish: FinishingTable, chain: _Chain, level: FloatArray) -> Iterator[_Sheet]:
     """Yield a collar as it stands or is turned down, and the placket below it."""
     if wish.style == "turtleneck":
-        yield _Sheet(rows=np.stack([chain.points, chain.points + wish.width * UP]), out=level)
+        yield _Sheet(rows=np.stack([chain.points, chain.points + 0.5 * wish.width * UP]), out=level)
         return
     chain = chain.from_front()
     level = unit(chain.out * [1.0, 0.0, 1.0])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import islice, pairwise, product
 
 import numpy as np
@@ -13,7 +13,7 @@ from warpflat.core import FloatArray, arc_lengths, points_at_lengths, without_si
 from warpflat.garment.construction.edges import SAME_LINE
 from warpflat.pattern import Pattern, Piece, Seam, SeamSide
 
-__all__ = ["draw_equal_pieces_once"]
+__all__ = ["Copy", "draw_equal_pieces_once", "drawn_sides", "run_back"]
 
 # Outlines are equal if they lie on each other within this [m], and this share of their size, after a rigid motion; grains are
 # within this [rad].
@@ -25,24 +25,34 @@ _SAMPLES = 33
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Copy:
+class Copy:
     """A piece that is cut by another one's pattern.
 
     Attributes:
         of: the piece that is drawn.
         edges: the edge of that piece for each of its own.
-        copy: its number among the copies, from 0.
         turned: whether it is cut turned over.
+        copy: its number among the copies, from 0.
         points: the other piece's edges, each as it lies here [m].
         apart: distance of both outlines [m].
     """
 
     of: str
     edges: Mapping[str, str]
-    copy: int
     turned: bool
-    points: Mapping[str, FloatArray]
-    apart: float
+    copy: int = 0
+    points: Mapping[str, FloatArray] = field(default_factory=dict)
+    apart: float = 0.0
+
+    def drawn(self, part: SeamSide) -> SeamSide:
+        """Return what is sewn at one of its edges as the edge of the piece that is drawn."""
+        return SeamSide(
+            piece=self.of,
+            edge=self.edges[part.edge],
+            reversed=part.reversed != self.turned,
+            mirrored=part.mirrored != self.turned,
+            copy=self.copy,
+        )
 
 
 def draw_equal_pieces_once(pattern: Pattern, called: str = "") -> tuple[Pattern, tuple[str, ...]]:
@@ -68,7 +78,7 @@ def draw_equal_pieces_once(pattern: Pattern, called: str = "") -> tuple[Pattern,
         if piece.name.startswith(called) and not (piece.darts or piece.holes or piece.on_fold or piece.name in unlike)
     ]
     at_seams = {side.place for side in sewn}
-    copies: dict[str, list[_Copy]] = {}
+    copies: dict[str, list[Copy]] = {}
     for number, head in enumerate(free):
         if head.name in copies or any(ways[0].of == head.name for ways in copies.values()):
             continue
@@ -105,7 +115,7 @@ def draw_equal_pieces_once(pattern: Pattern, called: str = "") -> tuple[Pattern,
     # A gore lies on another one upside down and turned over, too: its seams may run alike only so.
     for row in islice(product(*copies.values()), _MOST_WAYS):
         chosen = dict(zip(copies, row, strict=True))
-        seams = _run_alike([_told(seam, chosen) for seam in pattern.seams])
+        seams = _run_alike([replace(seam, sides=drawn_sides(seam, chosen)) for seam in pattern.seams])
         if seams is not None:
             break
     else:
@@ -134,14 +144,14 @@ def _stem(piece: Piece) -> tuple[str, str, str, int]:
     return re.sub(r"[ _]\d+$", "", without_side(piece.name)), piece.role, piece.fabric, piece.quantity
 
 
-def _laid_on(piece: Piece, head: Piece, *, turned: bool | None = None) -> list[_Copy]:
+def _laid_on(piece: Piece, head: Piece, *, turned: bool | None = None) -> list[Copy]:
     """Return how a piece lies on another one, the nearest way first, and those turned over last."""
     if len(piece.edges) != len(head.edges) or piece.grain is None or head.grain is None:
         return []
     goal = np.concatenate([_samples(edge.points) for edge in head.edges])
     middle = goal.mean()
     within = min(_SAME_OUTLINE, _SHARE * 2.0 * float(np.abs(goal - middle).max()))
-    found: list[_Copy] = []
+    found: list[Copy] = []
     for over in (False, True) if turned is None else (turned,):
         edges = [
             replace(edge, points=(edge.points * [-1.0, 1.0])[::-1] if over else edge.points)
@@ -166,7 +176,7 @@ def _laid_on(piece: Piece, head: Piece, *, turned: bool | None = None) -> list[_
                 continue
             laid = [middle + turn * (_complex(edge.points) - here.mean()) for edge in row]
             found.append(
-                _Copy(
+                Copy(
                     of=head.name,
                     edges={edge.name: two.name for edge, two in zip(row, head.edges, strict=True)},
                     copy=0,
@@ -189,7 +199,7 @@ def _samples(points: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.complex12
     return _complex(points_at_lengths(points, np.linspace(0.0, float(arc_lengths(points)[-1]), _SAMPLES)))
 
 
-def _averaged(head: Piece, copies: Sequence[_Copy]) -> tuple[Piece, float]:
+def _averaged(head: Piece, copies: Sequence[Copy]) -> tuple[Piece, float]:
     """Return a piece with the mean outline of all its copies, and how far that is from any of them at most [m]."""
     moved, edges = 0.0, []
     for edge in head.edges:
@@ -209,22 +219,17 @@ def _averaged(head: Piece, copies: Sequence[_Copy]) -> tuple[Piece, float]:
     return replace(head, edges=edges), moved
 
 
-def _told(seam: Seam, copies: Mapping[str, _Copy]) -> Seam:
-    """Return a seam between pieces that are drawn, and their copies."""
+def drawn_sides(seam: Seam, copies: Mapping[str, Copy]) -> tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]]:
+    """Return the sides of a seam between pieces that are drawn, and their copies by name."""
+    one, other = (
+        tuple(copies[part.piece].drawn(part) if part.piece in copies else part for part in side) for side in seam.sides
+    )
+    return one, other
 
-    def side(part: SeamSide) -> SeamSide:
-        copy = copies.get(part.piece)
-        if copy is None:
-            return part
-        return SeamSide(
-            piece=copy.of,
-            edge=copy.edges[part.edge],
-            reversed=part.reversed != copy.turned,
-            mirrored=part.mirrored != copy.turned,
-            copy=copy.copy,
-        )
 
-    return replace(seam, sides=(tuple(map(side, seam.sides[0])), tuple(map(side, seam.sides[1]))))
+def run_back(side: Sequence[SeamSide]) -> tuple[SeamSide, ...]:
+    """Return a side of a seam, run the other way."""
+    return tuple(replace(part, reversed=not part.reversed) for part in reversed(side))
 
 
 def _run_alike(seams: Sequence[Seam]) -> tuple[Seam, ...] | None:
@@ -240,12 +245,10 @@ def _run_alike(seams: Sequence[Seam]) -> tuple[Seam, ...] | None:
         number, seam = next((one for one in waiting if any(s.place in way for s in one[1].stretches)), waiting[0])
         waiting.remove((number, seam))
         known = [s for s in seam.stretches if s.place in way]
-        if known and known[0].reversed != way[known[0].piece, known[0].edge]:
-            sides = [tuple(replace(s, reversed=not s.reversed) for s in reversed(row)) for row in seam.sides]
-            seam = replace(seam, sides=(sides[0], sides[1]))
+        if known and known[0].reversed != way[known[0].place]:
+            seam = replace(seam, sides=(run_back(seam.sides[0]), run_back(seam.sides[1])))
         for s in seam.stretches:
-            key = s.piece, s.edge
-            if key in copied and way.setdefault(key, s.reversed) != s.reversed:
+            if s.place in copied and way.setdefault(s.place, s.reversed) != s.reversed:
                 return None
         made[number] = seam
     return tuple(made[number] for number in range(len(seams)))

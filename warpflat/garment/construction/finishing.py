@@ -112,7 +112,7 @@ def finish_edges(
             elif wish.shaped:
                 pattern = with_shaped_waistband(pattern, places, wish.width, gaps=gaps)
             else:
-                if wish.placket and wish.kind != "flounce":
+                if wish.placket:
                     pattern, breaks = with_slits(pattern, places, wish.placket, "sleeve")
                     pattern, places = _opened_up(pattern, wish.edge)
                 for chain, count in free_chains(pattern, places, gaps, breaks):
@@ -135,10 +135,11 @@ def _said_of(number: int) -> Iterator[None]:
 def hem_rises(pattern: Pattern, finishing: Sequence[FinishingTable]) -> dict[Place, tuple[FloatArray, FloatArray]]:
     """Return how wide a strip slanted hems lose in the sample size, as :func:`slant_rises` gives it."""
     found = dict[Place, tuple[FloatArray, FloatArray]]()
-    for wish in finishing:
+    for number, wish in enumerate(finishing):
         if isinstance(wish.shorten, Mapping):
-            places = _opened_up(pattern, wish.edge, sewn_there=False)[1]
-            found |= slant_rises(pattern, places, wish.shorten, pattern.sample)
+            with _said_of(number):
+                places = _opened_up(pattern, wish.edge, sewn_there=False)[1]
+                found |= slant_rises(pattern, places, wish.shorten, pattern.sample)
     return found
 
 

@@ -32,7 +32,7 @@ def with_flies(pattern: Pattern) -> Pattern:
     underlap of the waistband. Both are cut once: the facing for the half that lies above.
     """
     for seam in pattern.seams:
-        zips = [each for each in seam.openings if each.kind == "zip" and each.style == "lapped" and not each.begin]
+        zips = [each for each in seam.openings if each.kind == "zip" and each.style == "lapped" and each.begin <= 0.0]
         sides = seam.stretches
         in_front = all("front" in re.split("[ _]", side.piece) for side in sides)
         # Waistbands that are sewn to the edge above.
@@ -46,7 +46,7 @@ def with_flies(pattern: Pattern) -> Pattern:
             if pattern.piece(other.piece, pattern.sample).role == "waistband"
         ]
         if zips and len(sides) == 2 and in_front and bands:
-            pattern = _with_fly(pattern, seam, zips[0].length + _BELOW, bands[0])
+            pattern = _with_fly(pattern, seam, zips[0].begin + zips[0].length + _BELOW, bands[0])
     return pattern
 
 

@@ -265,8 +265,12 @@ def _with_curves(
     bounds, before = dict.fromkeys(garment.pieces, bound), garment.sewn
     for share in (0.5, 0.0, None):
         plans = plan_curves(garment.mannequin.layout, garment.form, garment.positions, bounds, held)
-        if not plans or before is None or not before.converged:
+        if before is None or not before.converged or (not plans and any(bounds.values())):
             return garment
+        if not plans:
+            # However little they are drawn, all pieces would be strained.
+            drawn = garment
+            break
         outcome = sew(
             garment.pieces, garment.stitching, constraints=[*held, *(plan.line for plan in plans)], folds=folds,
             options=options, offsets=before.offsets,

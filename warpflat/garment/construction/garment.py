@@ -21,14 +21,13 @@ from warpflat.core import (
     write_report,
 )
 from warpflat.flat import Flattening, run_metrics, separate
-from warpflat.garment.construction.border_seams import BorderSeam
 from warpflat.garment.construction.edges import SAME_PIECE
 from warpflat.garment.construction.laid_as_cut import CutPattern
 from warpflat.garment.construction.mirror import even_sides, mirror_images
 from warpflat.garment.construction.sewn import MeasuredSeam, Sewn, Stitching
 
 if TYPE_CHECKING:
-    from warpflat.garment.construction.details import FinishingTable, OpeningTable, PocketTable
+    from warpflat.garment.construction.details import FinishingTable, OpeningTable, PocketTable, SeamTable
     from warpflat.garment.construction.rings import GarmentRing
     from warpflat.garment.construction.wearer import WearerFit
     from warpflat.pattern import Body, DraftedOutline
@@ -58,7 +57,7 @@ class Garment:
     pieces: Mapping[str, Flattening]
     stitching: Sequence[Stitching] = ()
     sewn: Sewn | None = None
-    border_seams: Sequence[BorderSeam] = ()
+    border_seams: Sequence[SeamTable] = ()
     openings: Sequence[OpeningTable] = ()
     finishing: Sequence[FinishingTable] = ()
     pockets: Sequence[PocketTable] = ()
@@ -198,11 +197,12 @@ class Garment:
         return found if self.drape is None else {**found, "drape": self.drape}
 
     def summary(self) -> dict[str, Any]:
-        """Return the entry of another size in `metrics.json`: convergence, flips, stages and seams."""
+        """Return the entry of another size in `metrics.json`: convergence, flips, overlap, stages and seams."""
         pieces = {
             name: {
                 "converged": piece.converged,
                 "flipped_faces": piece.flipped_faces,
+                "overlap_m2": piece.overlap,
                 "stages": [stage.as_dict() for stage in piece.stages],
             }
             for name, piece in self.pieces.items()

@@ -14,7 +14,7 @@ from warpflat.pattern import PatternOptions, WrittenPattern, check_names, write_
 
 if TYPE_CHECKING:
     from warpflat.flat import Flattening
-    from warpflat.garment.construction.border_seams import BorderSeam
+    from warpflat.garment.construction.details import SeamTable
     from warpflat.garment.construction.garment import Garment
     from warpflat.pattern import FoundSeam, Pattern
 
@@ -67,7 +67,7 @@ def surface_files(
     *,
     name: str,
     options: PatternOptions | None = None,
-    seams: Sequence[BorderSeam] = (),
+    seams: Sequence[SeamTable] = (),
 ) -> WrittenPattern:
     """Write the pattern of a flattened surface, or of the pieces into which cuts have parted it.
 

@@ -91,10 +91,10 @@ def _with_opening(pattern: Pattern, opening: OpeningTable, part: OpeningPart, pa
         if seam.openings:
             raise InputError(f"{seam.name!r} has another opening; a wrap is open all along it")
         return _with_wrap(pattern, seam, opening)
-    begin, end = _reach(opening, part)
+    end = _reach(opening, part)[1]
     if opening.kind != "godet":
         opened = SeamOpening(
-            kind=opening.kind, length=_length(opening, parts[pattern.sample]), begin=begin, whole=end >= part.whole,
+            kind=opening.kind, length=_length(opening, parts[pattern.sample]), begin=opening.start - part.before, whole=end >= part.whole,
             style=opening.style if opening.kind == "zip" else "",
         )  # fmt: skip
         seam = replace(seam, openings=(*seam.openings, opened))
@@ -144,17 +144,25 @@ def _with_zip(pattern: Pattern, seam: Seam, opening: OpeningTable, parts: _Parts
     """Return a pattern with the line of a zip beside the edges of a seam, and a notch where it ends, if it does within the seam."""
     import shapely
 
-    for side in [side for side in seam.stretches if not side.mirrored]:
+    for row in seam.sides:
+        first = pattern.piece(row[0].piece, pattern.sample)
+        # From the upper end, past the darts that part a side into several edges.
+        passed = dict.fromkeys(parts, 0.0)
+        for side in row if downwards(first, row[0].edge)[1] != row[0].reversed else row[::-1]:
 
-        def beside_edge(piece: Piece, edge: str = side.edge) -> Piece:
-            row = parts[piece.size]
-            begin, stop = _reach(opening, _part_of(row, seam))
-            line = np.asarray(shapely.LineString(piece.edge(edge).points).offset_curve(_INSIDE).coords)
-            line = line if runs_down(piece, line) else line[::-1]
-            title = f"{opening.style} zip {1e3 * _length(opening, row):.0f} mm"
-            return drawn_on(piece, [(title, part_between(line, begin, min(stop, polyline_length(line))))])
+            def beside_edge(piece: Piece, edge: str = side.edge, passed: Mapping[str, float] = passed) -> Piece:
+                begin, stop = (
+                    place - passed[piece.size] for place in _reach(opening, _part_of(parts[piece.size], seam))
+                )
+                line = np.asarray(shapely.LineString(piece.edge(edge).points).offset_curve(_INSIDE).coords)
+                line = line if runs_down(piece, line) else line[::-1]
+                begin, stop = max(begin, 0.0), min(stop, polyline_length(line))
+                title = f"{opening.style} zip {1e3 * _length(opening, parts[piece.size]):.0f} mm"
+                return drawn_on(piece, [(title, part_between(line, begin, stop))] if stop > begin else [])
 
-        pattern = redrawn(pattern, side.piece, beside_edge)
+            if not side.mirrored:
+                pattern = redrawn(pattern, side.piece, beside_edge)
+            passed = {size: past + edge_at(pattern, side, size).length for size, past in passed.items()}
     if not ends:
         return pattern
     return with_notches(pattern, seam, {size: [_reach(opening, _part_of(row, seam))[1]] for size, row in parts.items()})

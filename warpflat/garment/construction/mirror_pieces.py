@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from warpflat.core import FloatArray, arc_lengths
 from warpflat.garment.construction.edges import SAME_LINE
+from warpflat.garment.construction.equal_pieces import Copy, drawn_sides, run_back
 from warpflat.garment.construction.mirror import mirror_plane
 from warpflat.pattern import Pattern, Piece, Seam, SeamSide
 
@@ -20,21 +21,6 @@ __all__ = ["draw_pairs_once"]
 
 # A plane of symmetry whose normal has this cosine to x at least is that between left and right.
 _UPRIGHT = 0.8
-
-
-@dataclass(frozen=True, kw_only=True)
-class _MirrorPair:
-    """A piece that is cut by another one's pattern, turned over.
-
-    Attributes:
-        name: the piece that is not drawn.
-        of: the piece that is drawn.
-        edges: for each edge of the first piece, the edge of the second that is its mirror image.
-    """
-
-    name: str
-    of: str
-    edges: Mapping[str, str]
 
 
 def draw_pairs_once(
@@ -54,35 +40,33 @@ def draw_pairs_once(
 
     # Mirror images in every size, with equal edges, and with seams that are mirror images too.
     every = [set(garment.pairs) for garment in garments.values()]
-    pairs: list[_MirrorPair] = []
+    copies: dict[str, Copy] = {}
     for first, second in next(iter(garments.values())).pairs:
         if first in unlike or second in unlike or not all((first, second) in known for known in every):
             continue
         matched = [_matching_edges(garments[size], pattern.pieces[size], first, second) for size in garments]
         if matched[0] is not None and all(edges == matched[0] for edges in matched):
-            pairs.append(_MirrorPair(name=second, of=first, edges=matched[0]))
+            copies[second] = Copy(of=first, edges=matched[0], turned=True)
     # A piece that is sewn differently needs notches of its own; leaving it out may make others differ.
     different = {""}
     while different:
-        by_name = {pair.name: pair for pair in pairs}
         different = {
             part.piece
             for seam in pattern.seams
-            for side in seam.sides
-            for part, drawn in zip(side, _replaced(side, by_name), strict=True)
-            if drawn.mirrored and _mirror_seam(drawn, pattern.seams, by_name) is None
+            for part in seam.stretches
+            if part.piece in copies and _mirror_seam(copies[part.piece].drawn(part), pattern.seams, copies) is None
         }
-        pairs = [pair for pair in pairs if pair.name not in different]
-    if not pairs:
+        copies = {name: copy for name, copy in copies.items() if name not in different}
+    if not copies:
         return pattern, ()
     (garment, *_), points, images = garments.values(), list[FloatArray](), list[FloatArray]()
-    for pair in pairs:
-        _, partners = garment.images[pair.of]
-        points.append(garment.pieces[pair.of].network.surface.vertices)
-        images.append(garment.pieces[pair.name].network.surface.vertices[partners])
+    for name, copy in copies.items():
+        _, partners = garment.images[copy.of]
+        points.append(garment.pieces[copy.of].network.surface.vertices)
+        images.append(garment.pieces[name].network.surface.vertices[partners])
     normal, off = mirror_plane(np.concatenate(points), np.concatenate(images))
     turn = Rotation.align_vectors([1.0, 0.0, 0.0], normal)[0].as_matrix() if normal[0] > _UPRIGHT else None
-    twice, left_out = {pair.of for pair in pairs}, {pair.name for pair in pairs}
+    twice = {copy.of for copy in copies.values()}
 
     def drawn(piece: Piece) -> Piece:
         if turn is not None and piece.placement is not None:
@@ -90,36 +74,33 @@ def draw_pairs_once(
             piece = replace(piece, placement=hung)
         return replace(piece, quantity=2 * piece.quantity) if piece.name in twice else piece
 
-    pieces = {
-        size: [drawn(piece) for piece in row if piece.name not in left_out] for size, row in pattern.pieces.items()
-    }
-    notes = tuple(f"{pair.of}: cut twice, once mirrored, it serves for {pair.name} too" for pair in pairs)
-    return replace(pattern, pieces=pieces, seams=_sewn_once(pattern.seams, pairs)), notes
+    pieces = {size: [drawn(piece) for piece in row if piece.name not in copies] for size, row in pattern.pieces.items()}
+    notes = tuple(f"{copy.of}: cut twice, once mirrored, it serves for {name} too" for name, copy in copies.items())
+    return replace(pattern, pieces=pieces, seams=_sewn_once(pattern.seams, copies)), notes
 
 
-def _sewn_once(seams: Sequence[Seam], mirror_pairs: Sequence[_MirrorPair]) -> tuple[Seam, ...]:
+def _sewn_once(seams: Sequence[Seam], copies: Mapping[str, Copy]) -> tuple[Seam, ...]:
     """Replace the edges of pieces that are not drawn by those of the pieces that are.
 
     Such a seam runs as its mirror image does, so that the notches of one are those of the other.
     """
-    by_name = {pair.name: pair for pair in mirror_pairs}
     sewn = []
     for seam in seams:
-        sides = (_replaced(seam.sides[0], by_name), _replaced(seam.sides[1], by_name))
+        sides = drawn_sides(seam, copies)
         mirrored = [side for row in sides for side in row if side.mirrored]
         if not mirrored:
             sewn.append(seam)
             continue
-        image = _mirror_seam(mirrored[0], seams, by_name)
+        image = _mirror_seam(mirrored[0], seams, copies)
         assert image is not None  # draw_pairs_once sees to it
         other, place = image
         ease, (first, last) = seam.ease, seam.eased
         if next(number for number in (0, 1) if mirrored[0] in sides[number]) != place:
             first, last = (seam.reach(share, 1.0) / (1.0 + ease) for share in (first, last))
             sides, ease = (sides[1], sides[0]), 1.0 / (1.0 + ease) - 1.0
-        there = next(side for side in other.sides[place] if _key(side) == _key(mirrored[0]))
+        there = next(side for side in other.sides[place] if side.place == mirrored[0].place)
         if there.reversed != mirrored[0].reversed:
-            sides = (_reversed_side(sides[0]), _reversed_side(sides[1]))
+            sides = (run_back(sides[0]), run_back(sides[1]))
             first, last = 1.0 - last, 1.0 - first
         notches = None if seam.notches is None else tuple(at for at in (first, last) if 0.0 < at < 1.0)
         sewn.append(replace(seam, sides=sides, ease=ease, eased=(first, last), notches=notches))
@@ -144,36 +125,10 @@ def _matching_edges(garment: Garment, pieces: Sequence[Piece], first: str, secon
     return edges if len(edges) == len(two.edges) else None
 
 
-def _mirror_seam(
-    side: SeamSide, seams: Sequence[Seam], mirror_pairs: Mapping[str, _MirrorPair]
-) -> tuple[Seam, int] | None:
+def _mirror_seam(side: SeamSide, seams: Sequence[Seam], copies: Mapping[str, Copy]) -> tuple[Seam, int] | None:
     """Return the seam at which the drawn edge is sewn itself, and the side of it."""
     for seam in seams:
         for number in (0, 1):
-            if any(part.piece not in mirror_pairs and _key(part) == _key(side) for part in seam.sides[number]):
+            if any(part.piece not in copies and part.place == side.place for part in seam.sides[number]):
                 return seam, number
     return None
-
-
-def _replaced(side: Sequence[SeamSide], mirror_pairs: Mapping[str, _MirrorPair]) -> tuple[SeamSide, ...]:
-    """Replace the edges of pieces that are not drawn."""
-    return tuple(
-        SeamSide(
-            piece=mirror_pairs[part.piece].of,
-            edge=mirror_pairs[part.piece].edges[part.edge],
-            reversed=not part.reversed,
-            mirrored=True,
-        )
-        if part.piece in mirror_pairs
-        else part
-        for part in side
-    )
-
-
-def _reversed_side(side: Sequence[SeamSide]) -> tuple[SeamSide, ...]:
-    """Return a side of a seam, run the other way."""
-    return tuple(replace(part, reversed=not part.reversed) for part in reversed(side))
-
-
-def _key(side: SeamSide) -> tuple[str, str]:
-    return side.piece, side.edge

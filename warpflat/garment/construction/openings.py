@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest, other_side, without_side
+from warpflat.core import (
+    FloatArray,
+    InputError,
+    IntArray,
+    arc_lengths,
+    find_unused_name,
+    nearest,
+    other_side,
+    without_side,
+)
 from warpflat.garment.construction.details import OpeningTable
 from warpflat.garment.construction.rings import find_rings, ring_line
 from warpflat.garment.mannequin.bricks import select_bricks
@@ -154,7 +163,10 @@ def opened_rings(
 
     The way around goes along an opening to its end and back: twice the distance to the nearer end that is closed.
     """
-    rings = {ring_line(mannequin, ring): set(ring.tolist()) for ring, _ in find_rings(mannequin, form, positions)}
+    rings: dict[str, set[int]] = {}
+    for ring, _ in find_rings(mannequin, form, positions):
+        # Called as they are where they are measured.
+        rings[find_unused_name(ring_line(mannequin, ring), rings)] = set(ring.tolist())
     edges = set().union(*rings.values())
     levels = {level: set(mannequin.layout.lines[level].tolist()) for level in RING_LEVELS}
     found: dict[str, float] = {}

@@ -97,7 +97,7 @@ def with_placket(pattern: Pattern, places: Sequence[Place], length: float, calle
         called: what the strips are named after.
 
     Raises:
-        InputError: no edge crosses the centre front, or the slit does not lie within its piece.
+        InputError: no edge crosses the centre front, the slit is too short for two buttons, or does not lie within its piece.
     """
     import shapely
 
@@ -127,6 +127,11 @@ def with_placket(pattern: Pattern, places: Sequence[Place], length: float, calle
         inside = {title: shapely.LineString(line).intersection(body.buffer(ON)) for title, line in lines.items()}
         return drawn_on(piece, [(title, np.asarray(line.coords)) for title, line in inside.items()])
 
+    least = _FIRST + _APART + _LAST
+    if length < least:
+        raise InputError(
+            f"a placket of {1e3 * length:.0f} mm is too short for two buttons; make it {1e3 * least:.0f} mm or longer"
+        )
     marks, holes = dict[str, FloatArray](), dict[str, FloatArray]()
     # The upper end lies on the left. Both strips are marked: one gets the buttons, the other one the buttonholes.
     for number, x in enumerate(np.linspace(_FIRST, length - _LAST, max(2, int((length - 0.02) / _APART)))):

@@ -160,7 +160,8 @@ def _middles(piece: Piece, pocket: PocketTable, across: FloatArray, level: float
     """
     import shapely
 
-    known = lines_of(piece)
+    # Where a piece buttons, its centre line lies inside, and the edge of that name is its stand's.
+    known = {**piece.internal_lines, **lines_of(piece)}
     centre = next((points for name, points in known.items() if name.startswith("centre")), None)
     if centre is not None:
         at, away = float((centre @ across).mean()), pocket.from_centre + 0.5 * pocket.width

@@ -12,9 +12,10 @@ import numpy as np
 
 from warpflat.core import BoolArray, InputError, IntArray, arc_lengths, find_unused_name
 from warpflat.flat import SAME_PLACE, Flattening, Layer, RelaxOptions, Surface, border_loops, join_labels, lies_within
-from warpflat.garment.construction.border_seams import ONE_CURVE, BorderSeam, surface_seams
+from warpflat.garment.construction.border_seams import ONE_CURVE, surface_seams
 from warpflat.garment.construction.closed_cuts import seams_of_cuts
 from warpflat.garment.construction.constraints import Constraint, KeptGirth
+from warpflat.garment.construction.details import SeamTable
 from warpflat.garment.construction.fullness import FullEdge, give_fullness
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.mirror import even_sides, mirror_images
@@ -47,7 +48,7 @@ def sew_pieces(
     pieces: Sequence[Flattening],
     constraints: Sequence[Constraint] = (),
     *,
-    seams: Sequence[BorderSeam] = (),
+    seams: Sequence[SeamTable] = (),
     options: RelaxOptions | None = None,
     name: str | None = None,
     eased: bool = False,
@@ -84,7 +85,9 @@ def sew_pieces(
     first = next(iter(flat))
     found = surface_seams(flat[first].network.surface, seams)
     # More cloth along the sides that are meant to be longer.
-    longer = [(seam, pair.vertices[seam.longer]) for seam, pair in zip(seams, found, strict=True) if seam.factor > 1.0]
+    longer = [
+        (seam, pair.vertices[seam.longer_line]) for seam, pair in zip(seams, found, strict=True) if seam.factor > 1.0
+    ]
     if longer and flat[first].cuts:
         raise InputError(
             f"seam {longer[0][0].name!r}: fullness and gathers need a piece that is not cut; leave out the cuts or the fullness"

@@ -22,6 +22,7 @@ from warpflat.garment.construction.edges import (
     Place,
     beside,
     direction,
+    downwards,
     edge_at,
     in_sizes,
     lines_ending_on,
@@ -238,8 +239,17 @@ def _slanted_strip(piece: Piece, name: str, rise: tuple[FloatArray, FloatArray])
 def _with_moved_notches(
     pattern: Pattern, seam: Seam, cut: dict[Place, tuple[str, bool]], widths: Mapping[Place, float]
 ) -> Seam:
-    """Return a seam whose given notches keep their places on the cloth where its upper end is cut off."""
+    """Return a seam whose openings and given notches keep their places on the cloth where one of its ends is cut off."""
     side = seam.sides[0][0]
+    for each in seam.stretches:
+        if seam.openings and each.place in cut:
+            upper = cut[each.place][1] == downwards(pattern.piece(each.piece, pattern.sample), each.edge)[1]
+            moved = [
+                replace(one, begin=one.begin - widths[each.place]) if upper == (one.kind in ("zip", "buttons")) else one
+                for one in seam.openings
+            ]
+            seam = replace(seam, openings=tuple(moved))
+            break
     if seam.notches is None or side.place not in cut or len(seam.sides[0]) > 1:
         return seam
     # The strip lies at the start of the edge after the waist, and at the end of the one before it.

@@ -76,7 +76,6 @@ def find_band(piece: Flattening) -> Band | None:
     if half - width < _NARROW * width:
         return None
     around = np.vstack([piece.positions[loop], piece.positions[loop[:1]]])
-    turn = np.zeros(len(loop))
     ways = []
     for beside in (-_BESIDE_CORNER * width, _BESIDE_CORNER * width):
         at = (arc[:-1] + beside) % arc[-1]

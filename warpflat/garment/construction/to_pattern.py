@@ -79,7 +79,7 @@ from warpflat.pattern import (
 
 if TYPE_CHECKING:
     from warpflat.flat import Crack, Flattening, Surface
-    from warpflat.garment.construction.border_seams import BorderSeam
+    from warpflat.garment.construction.details import SeamTable
     from warpflat.garment.construction.garment import Garment
     from warpflat.garment.construction.openings import OpeningPart
     from warpflat.garment.construction.sewn import Stitching
@@ -181,8 +181,9 @@ def pattern_of_garment(
         for edge in piece.edges
         if edge.name == f"{opening.seam} {STAND}"
     ]
-    rises = hem_rises(pattern, sample.finishing)
+    rises: Mapping[tuple[str, str], Any] = {}
     with optional_step("the pattern has no finishing"):
+        rises = hem_rises(pattern, sample.finishing)
         girths = {size: garment.body_girths for size, garment in laid.items()}
         pattern = finish_edges(
             pattern, sample.finishing, gaps=gaps, stands=stands, girths=girths, cloth_width=cloth_width
@@ -315,8 +316,9 @@ def _drawn_on_forms(
     for title, (piece, edge) in zip(
         name_seams(list(opened.values()), [(piece, piece) for piece in opened]), opened.items(), strict=True
     ):
-        side = (SeamSide(piece=piece, edge=edge),)
-        seams = (*seams, Seam(name=find_unused_name(title, {seam.name for seam in seams}), sides=(side, side)))
+        side = SeamSide(piece=piece, edge=edge)
+        title = find_unused_name(title, {seam.name for seam in seams})
+        seams = (*seams, Seam(name=title, sides=((side,), (replace(side, mirrored=True),))))
     placed = {
         size: [place_opening(garment.form, opening, garment.positions) for opening in garment.openings]
         for size, garment in laid.items()
@@ -493,7 +495,7 @@ def pattern_of_surface(
     name: str,
     rules: EdgeRules | None = None,
     size: str = "",
-    seams: Sequence[BorderSeam] = (),
+    seams: Sequence[SeamTable] = (),
     ends: Mapping[str, Collection[int]] | None = None,
     worn: Collection[str] = (),
 ) -> tuple[Pattern, tuple[str, ...]]:
@@ -533,7 +535,7 @@ def pattern_of_surface(
     named = []
     for seam in seams:
         with optional_step(f"seam {seam.name!r} was left out of the pattern"):
-            first, second = (_edges_along(line, results, pieces) for line in seam.sides)
+            first, second = (_edges_along(line, results, pieces) for line in seam.lines)
             back = tuple(replace(side, reversed=True) for side in reversed(second))  # the two run against each other
             named.append(Seam(name=seam.name, sides=(first, back), ease=seam.ease))
     names = {p.name: [*(edge.name for edge in p.edges), *(hole.name for hole in p.holes)] for p in pieces}

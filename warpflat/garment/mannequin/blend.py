@@ -46,10 +46,10 @@ class Adjustment:
     Attributes:
         like: another profile whose outline is mixed in by `weight`.
         weight: 0 keeps the outline, 1 takes all of the other's.
-        bridge: hollows are bridged, as cloth hangs from bust point to bust point.
+        bridge: hollows are bridged, as cloth hangs from bust point to bust point; not of the chest and of arms.
         scale: blow-up about the profile's middle.
         offset_cm: distance that the profile moves outward [cm].
-        raise_cm: how far the profile moves up [cm], down if negative.
+        raise_cm: how far the profile moves up [cm], down if negative; not of the chest and of arms.
     """
 
     like: str | None = None
@@ -115,6 +115,8 @@ def adjusted_vertices(
         for name in (level, change.like):
             if name is not None and name not in known:
                 raise InputError(f"form: profile {name!r} cannot be adjusted: {nearest(name, known)}")
+        if level in ("chest", *ARM_LEVELS) and (change.bridge or change.raise_cm):
+            raise InputError(f"form: profile {level}: it is neither bridged nor raised; leave bridge and raise_cm out")
         parts = [next((i for i, part in enumerate(_PARTS) if name in part), -1) for name in (level, change.like)]
         if change.like and (-1 in parts or parts[0] != parts[1]):
             raise InputError(f"form: profile {level} cannot be like {change.like}; take a level of the same part")

@@ -57,15 +57,15 @@ class FormDart:
     name: str
     piece: str
     line: str
+    at: str | None = None
     towards: str | None = None
-    between: float = 0.5
-    part: tuple[float, float] | None = None
     tip_mm: float | None = None
-    mirrored: bool = True
     mouth_mm: float | None = None
     like: str | None = None
-    at: str | None = None
     pleat_mm: float | None = None
+    between: float = 0.5
+    part: tuple[float, float] | None = None
+    mirrored: bool = True
 
     @property
     def place(self) -> tuple[str, str, str | None, str | None]:

@@ -68,9 +68,14 @@ def taken_over(layout: Layout, vertices: FloatArray, form: Form, seams: Sequence
 
     Args and errors as of :func:`part_pieces`.
     """
-    left = {(dart.name, dart.line, dart.at) for dart in part_pieces(layout, vertices, form, seams).darts}
-    pieces = {seam.piece for seam in seams}
-    return [dart for dart in form.darts if dart.piece in pieces and (dart.name, dart.line, dart.at) not in left]
+    gone = list[FormDart]()
+    for piece in dict.fromkeys(seam.piece for seam in seams):
+        # Of one piece at a time: a dart of another one may have its name and its line.
+        own = tuple(dart for dart in form.darts if dart.piece == piece)
+        parted = part_pieces(layout, vertices, replace(form, darts=own), seams)
+        left = {(dart.name, dart.line, dart.at) for dart in parted.darts}
+        gone += [dart for dart in own if (dart.name, dart.line, dart.at) not in left]
+    return gone
 
 
 def princess_seams(layout: Layout, bricks: Sequence[str], piece: str) -> list[FormDart]:

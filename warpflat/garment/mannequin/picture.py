@@ -20,8 +20,10 @@ from warpflat.pattern import (
     Pen,
     Scale,
     View,
+    draw_row,
     drawn_page,
     make_facets,
+    row_size,
     space_out,
     views_around,
     write_maps,
@@ -32,8 +34,9 @@ if TYPE_CHECKING:
 
 __all__ = ["body_views", "signed_distances", "write_distance_picture", "write_mannequin_picture"]
 
-_VIEWS = (("front", 0.0), ("three-quarter", 38.0), ("left side", 90.0), ("back", 180.0))
-_HEIGHT = 8.0  # of the page [in]
+# The side comes last: its names stand beyond it.
+_VIEWS = (("front", 0.0), ("three-quarter", 38.0), ("back", 180.0), ("left side", 90.0))
+_HEIGHT, _GAP, _NAMES = 8.0, 0.2, 1.8  # of the page, between views, and room for names [in]
 _LINE, _LEADER = "#9c1f30", (*INK, 0.65)
 # A line is not drawn where it turns from the eye: there it slips along the outline.
 _FACING = 0.12
@@ -53,47 +56,30 @@ def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) 
     Raises:
         InputError: if the file cannot be written.
     """
-    faces = mannequin.layout.body_faces
-    views = body_views(mannequin, _VIEWS)
-    span = float(views["front"].size[1])
-    # The side view keeps room for the profiles' names behind it.
-    widths = [0.62 * span if title == "left side" else 1.03 * float(view.size[0]) for title, view in views.items()]
-    scale = _HEIGHT * 0.92 / (1.06 * span)
-    with drawn_page(path, sum(widths) * scale, _HEIGHT) as pen:
-        left = 0.0
-        for (title, view), width in zip(views.items(), widths, strict=True):
-            middle = left + (0.5 * width - (0.11 * span if title == "left side" else 0.0)) * scale
-            left += width * scale
-            corner = middle - 0.5 * float(view.size[0]) * scale
-            drawn = DrawnView(
-                pen, view, left=corner, bottom=0.01 * _HEIGHT + 0.02 * span * scale, inches_per_metre=scale
-            )
-            drawn.draw(np.tile(SKIN, (len(faces), 1)))
-            towards = vertex_normals(view.points, faces)[:, 2] > _FACING
+    faces, views = mannequin.layout.body_faces, body_views(mannequin, _VIEWS)
+    wide, high = row_size(views)
+    scale = 0.87 * _HEIGHT / high
+    with drawn_page(path, scale * wide + _GAP * len(views) + _NAMES, _HEIGHT) as pen:
+        skins = [np.tile(SKIN, (len(faces), 1))] * len(views)
+        row = draw_row(pen, views, skins, left=0.5 * _GAP, bottom=0.22, inches_per_metre=scale, gap=_GAP)
+        for title, drawn in zip(views, row, strict=True):
+            towards = vertex_normals(drawn.view.points, faces)[:, 2] > _FACING
             for ids in mannequin.layout.body_lines.values():
                 edges = np.column_stack([ids[:-1], ids[1:]])
                 drawn.draw_segments(edges[towards[edges].all(axis=1)], width=0.9, colour=_LINE)
-            if title == "left side":
-                # Names and girths [cm] of the profiles stand behind the side view, on short leaders, spread so that none overlap.
-                levels = mannequin.levels()
-                trunk = RING_LEVELS[RING_LEVELS.index("hip") :]
-                names = ["neck", "chest back", *reversed(trunk), *(f"{line} left" for line in LEG_LINES.values())]
-                height = drawn.box[3] - drawn.box[1]
-                ends = []
-                for name in names:
-                    line = drawn.to_page(drawn.view.points[mannequin.layout.lines[name]])
-                    ends.append(line[int(np.argmax(line[:, 0]))])
-                places = space_out([float(end[1]) for end in ends], 0.028 * height, drawn.box[1], drawn.box[3])
-                x = middle + 0.17 * height
-                for name, end, y in zip(names, ends, places, strict=True):
-                    shown = {"neck": "neck base", "chest back": "across back"}.get(name, name)
-                    pen.line(
-                        np.array([(float(end[0]) + 0.03, float(end[1])), (x - 0.06, y)]), width=0.5, colour=_LEADER
-                    )
-                    pen.write(x, y, f"{shown} {levels[name].girth * 100:.1f} cm", 8)
-            else:
+            if title != "left side":
                 _label_lines(pen, drawn, mannequin, title)
-            pen.write(middle, drawn.box[3] + 0.03 * span * scale, title, 11, ha="center")
+        # Names and girths [cm] of the profiles stand behind the side view, on short leaders, spread so that none overlap.
+        levels, (_, bottom, right, top) = mannequin.levels(), drawn.box
+        trunk = RING_LEVELS[RING_LEVELS.index("hip") :]
+        names = ["neck", "chest back", *reversed(trunk), *(f"{line} left" for line in LEG_LINES.values())]
+        lines = [drawn.to_page(drawn.view.points[mannequin.layout.lines[name]]) for name in names]
+        ends = [line[int(np.argmax(line[:, 0]))] for line in lines]
+        places = space_out([float(end[1]) for end in ends], 0.028 * (top - bottom), bottom, top)
+        for name, end, y in zip(names, ends, places, strict=True):
+            shown = {"neck": "neck base", "chest back": "across back"}.get(name, name)
+            pen.line(np.array([(end[0] + 0.03, end[1]), (right + 0.44, y)]), width=0.5, colour=_LEADER)
+            pen.write(right + 0.5, y, f"{shown} {levels[name].girth * 100:.1f} cm", 8)
         pen.write(0.5 * pen.width, 0.98 * _HEIGHT, f"Mannequin: {mannequin.source}", 12, ha="center")
 
 

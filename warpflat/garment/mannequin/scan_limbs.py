@@ -13,7 +13,7 @@ from warpflat.garment.mannequin.layout import LEG_LEVELS, QUARTERS
 from warpflat.garment.mannequin.rays import ray_radii, row_at, smooth_radii, with_harmonics
 from warpflat.garment.mannequin.scan_sections import ArmSections, BodySections
 from warpflat.garment.mannequin.slicer import UP, Slicer
-from warpflat.garment.mannequin.table_legs import crotch_curve, profile_of_curve
+from warpflat.garment.mannequin.table_legs import AROUND_LEG, crotch_curve, profile_of_curve
 
 __all__ = ["leg_curves", "underarm_point", "upper_curves"]
 
@@ -31,8 +31,8 @@ _HARMONICS = 5
 _STEEP = 10.0
 # Where an arm is sliced between biceps (0), elbow (1) and wrist (2): forearms swell below the elbow.
 _ARM_PLACES = (0.5, 1.25, 1.5, 1.75)
-# Rays around a leg, and their harmonics that are kept.
-_COUNT, _LEG_HARMONICS = 240, 16
+# Harmonics around a leg that are kept.
+_LEG_HARMONICS = 16
 # The outseam lies in the middle of what is within so much [m] of the outermost, smoothed along the leg [rows].
 _OUTERMOST, _OUTSEAM_SIGMA = 0.004, 6.0
 # Share of the crotch curve's length ahead of the crotch point.
@@ -341,8 +341,8 @@ def leg_curves(body: BodySections, levels: Mapping[str, float], hip: Profile) ->
         middle = gaussian_filter1d(np.array([0.5 * (h.min(axis=0) + h.max(axis=0)) for h in hulls]), 2.0, axis=0)
         # Rays turn from the inside over the front: as those of a trunk that looks to the inside.
         turned = [(h - m)[:, ::-1] * np.array([1.0, -1.0]) for h, m in zip(hulls, middle, strict=True)]
-        radii = smooth_radii(turned, np.zeros_like(middle), legs.y, _COUNT, _LEG_HARMONICS)
-        rays = np.arange(_COUNT) * 2.0 * np.pi / _COUNT
+        radii = smooth_radii(turned, np.zeros_like(middle), legs.y, AROUND_LEG, _LEG_HARMONICS)
+        rays = np.arange(AROUND_LEG) * 2.0 * np.pi / AROUND_LEG
         outward = np.column_stack([-np.cos(rays), np.sin(rays)])
         curves[side] = (radii[..., None] * outward + middle[:, None]) * np.array([sign, 1.0])
         # The outer side is flat: the middle of what is outermost, smooth along the leg.
@@ -358,12 +358,12 @@ def leg_curves(body: BodySections, levels: Mapping[str, float], hip: Profile) ->
         near = max(0.0, 1.0 - (thigh - height) / (thigh - knee))
         # At the thigh the inseam stands below the crotch point, from the knee down on the leg's inside.
         s = arc_lengths(curve, closed=True)
-        inside = np.arange(-_COUNT // 5, _COUNT // 5)
+        inside = np.arange(-AROUND_LEG // 5, AROUND_LEG // 5)
         ahead = float(
-            np.interp(point, np.maximum.accumulate(curve[inside, 1]), s[inside % _COUNT] - s[-1] * (inside < 0))
+            np.interp(point, np.maximum.accumulate(curve[inside, 1]), s[inside % AROUND_LEG] - s[-1] * (inside < 0))
         )
         share = near * float(np.clip(ahead / s[-1], -0.1, 0.1))
-        curve = resample(curve, share + np.arange(_COUNT) / _COUNT, closed=True)
+        curve = resample(curve, share + np.arange(AROUND_LEG) / AROUND_LEG, closed=True)
         girth, outseam = (float(row_at(rows[side], legs.y, height)) for rows in (legs.girths, outseams))
         return profile_of_curve(curve, girth, near, outseam)
 

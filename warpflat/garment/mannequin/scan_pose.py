@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core import FloatArray, InputError, nearest, unit
-from warpflat.flat import join_labels, stray_vertex, stray_words
+from warpflat.flat import METRES_PER_UNIT, join_labels, stray_vertex, stray_words
 from warpflat.garment.mannequin.scan_repair import find_holes, smooth_noise, turned_outward
 from warpflat.garment.mannequin.slicer import UP, Slicer, plane_axes
 from warpflat.garment.mannequin.summit import summit
 
 __all__ = ["LANDMARKS", "LEVELS_UP", "ScanOptions", "across_trunk", "find_facing", "find_legs", "turn_scan_upright"]
 
-_UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+_UNITS = {name: METRES_PER_UNIT[name] for name in ("m", "dm", "cm", "mm", "in")}
 _AXES = {s + a: sign * np.eye(3)["xyz".index(a)] for s, sign in (("+", 1.0), ("-", -1.0)) for a in "xyz"}
 _STATURE = (0.9, 2.3)
 #: Levels of trunk and legs, from the floor up.

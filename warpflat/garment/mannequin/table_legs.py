@@ -14,12 +14,13 @@ from warpflat.garment.mannequin.layout import LEG_LEVELS, LEG_LINES
 from warpflat.garment.mannequin.measurements import Measurements
 from warpflat.garment.mannequin.profiles import Section, convex_girth, section_curve
 
-__all__ = ["crotch_curve", "legs_from_measurements", "profile_of_curve"]
+__all__ = ["AROUND_LEG", "crotch_curve", "legs_from_measurements", "profile_of_curve"]
 
 # Width of a leg's section as a share of its girth, and its area as a share of width times depth, down the leg.
 _WIDTH = {"leg_thigh": 0.300, "leg_knee": 0.305, "leg_calf": 0.310, "leg_ankle": 0.295}
 _AREA = 0.80
-_SAMPLES = 240
+#: Places around a leg.
+AROUND_LEG = 240
 # Room [m] between the legs' insides and the midplane, and between their outsides and the tube around both.
 _BETWEEN, _INSIDE = 0.002, 0.001
 # The crotch curve is a superellipse of this exponent. The crotch point divides its length as front and back fork do.
@@ -60,10 +61,10 @@ def legs_from_measurements(m: Measurements, profile: Callable[[float], Profile])
     @functools.cache
     def left(height: float) -> LegProfile:
         girth, width, depth, x, z, ahead = smooth(height)
-        curve = section_curve(Section(width=width, depth=depth, area=_AREA, front=0.5, shift=0.0), _SAMPLES)
+        curve = section_curve(Section(width=width, depth=depth, area=_AREA, front=0.5, shift=0.0), AROUND_LEG)
         # `section_curve` runs from the front over the body's left: the left leg's innermost point is three quarters around.
         inseam = 0.75 + ahead / polyline_length(curve, closed=True)
-        curve = resample(curve, inseam + np.arange(_SAMPLES) / _SAMPLES, closed=True) + np.array([x, z])
+        curve = resample(curve, inseam + np.arange(AROUND_LEG) / AROUND_LEG, closed=True) + np.array([x, z])
         down = (heights["leg_thigh"] - height) / (heights["leg_thigh"] - heights["leg_knee"])
         return profile_of_curve(curve, float(girth), max(0.0, 1.0 - down), float(z))
 
@@ -116,6 +117,6 @@ def _depth(width: float, girth: float) -> float:
 
     def miss(depth: float) -> float:
         section = Section(width=width, depth=depth, area=_AREA, front=0.5, shift=0.0)
-        return convex_girth(section_curve(section, _SAMPLES)) - girth
+        return convex_girth(section_curve(section, AROUND_LEG)) - girth
 
     return float(brentq(miss, 0.02 * girth, 0.6 * girth, xtol=1e-6))

@@ -55,31 +55,27 @@ ROLES = ("neck", "waist", "hem", "sleeve", "leg", "opening", "armhole", "hole", 
 # Lengths are shares of the square root of the area, unless they say otherwise.
 # A border shorter than this is a hole: a buttonhole, or a fault of the mesh.
 HOLE = 0.06
-# Two borders mirror each other if their middles do within this, and their lengths within this ratio.
-_PAIR, _PAIR_RATIO = 0.3, 1.7
-# A border whose middle is nearer to the plane of symmetry is in the middle.
-_BESIDE = 0.06
+# Two borders mirror each other if their lengths agree within this ratio.
+_PAIR_RATIO = 1.7
 # An opening in front reaches down by at least this share of the garment's height.
 _OPEN = 0.6
 # A sleeve shorter than this is an armhole with a facing.
 _SHORTEST_SLEEVE = 0.05
 # The way along sleeve and side bends at the armpit by at least this [cosine of the angle between both].
 _STRAIGHT = np.cos(np.radians(160.0))
-# Nothing that is worn around the trunk, and no head's opening, is narrower [m]; no sleeve is wider.
-_SLIMMEST = 0.55
-# What is narrower below its upper end by this share is no skirt; if it goes on below its waist by this [m], it is a dress.
-_WAISTED, _BELOW_WAIST = 0.93, 0.3
+# Nothing that is worn around the trunk is narrower [m]; no sleeve is wider, and no neck around which a poncho's upper end faces up.
+_SLIMMEST = 0.6
+# What is narrower below its upper end by this share is no skirt; if it goes on from its waist beyond the thigh, it is a dress.
+_WAISTED = 0.93
 # A waist is no longer than the cloth below it is wide by this; what goes on farther below an armhole, or a neck, than this is a dress [m].
 _WAVES, _LONG = 1.25, 0.8
-# Around a neck that is no longer [m], this upper share of a poncho faces up in the mean.
-_NECKS, _SHOULDERS = 0.62, 0.35
-# The trunk of a newborn is so long, and so far around its widest opening [m]. What is shorter than the third ends at the thigh, where a
-# leg's girth is this share of the waist's.
+# The trunk of a newborn is so long, and so far around its widest opening [m]. From the waist to the thigh it is no farther than the third
+# [m]; a leg's girth is there this share of the waist's.
 _LEAST_BODY, _TO_THE_THIGH, _THIGH = (0.12, 0.28), 0.3, 0.35
 # Openings around heads, and around wrists and ankles, are so long [m]; a hand is no thicker than this share of its width.
 _HEADS, _HANDS, _FLAT_HAND = (0.38, 0.75), (0.1, 0.45), 0.65
-# A hem slants if it spans this share of the height, and the cloth above it, at least the second share of all, tells left from right.
-_SLANT, _ENOUGH_ABOVE = 0.15, 0.2
+# Above a hem that slants, the cloth tells left from right if it is at least this share of all.
+_ENOUGH_ABOVE = 0.2
 #: A border is a ring if its area vector is at least this of a circle's; an opening in front is none.
 RING = 0.6
 # Cloth that goes on from all its
@@ -87,7 +83,7 @@ RING = 0.6
 _TUBE = 1.16
 # It is turned around if it can be worn better by this.
 _SURELY = 0.25
-#: An opening in front ends above and below in such a share of the garment's height.
+#: A garment ends above and below in such a share of its height: an opening in front does, and a hem that spans more slants.
 END = 0.15
 # A plane of symmetry holds if the mirror image of the cloth lies on the cloth within this (median).
 _SYMMETRIC = 0.02
@@ -389,7 +385,7 @@ def _above_slanted_hem(cloth: Cloth, upward: FloatArray, loops: Sequence[Border]
         return cloth.mass
     hem = min(wide, key=lambda own: float(own.mean()))
     above = cloth.mass * (heights > hem.max())
-    slants = np.ptp(hem) > _SLANT * np.ptp(heights) and above.sum() > _ENOUGH_ABOVE * cloth.mass.sum()
+    slants = np.ptp(hem) > END * np.ptp(heights) and above.sum() > _ENOUGH_ABOVE * cloth.mass.sum()
     return above if slants else cloth.mass
 
 
@@ -457,10 +453,9 @@ def _roles(raw: Sequence[Border], normal: FloatArray, offset: float, size: float
         away = float(np.linalg.norm(reflected(raw[i].middle, normal, offset) - raw[j].middle))
         short, long = sorted((raw[i].length, raw[j].length))
         if (
-            away < _PAIR * size
-            and away < 0.7 * abs(across[i] - across[j])
+            away < 0.7 * abs(across[i] - across[j])
             and long < _PAIR_RATIO * short
-            and min(abs(across[i]), abs(across[j])) > _BESIDE * size
+            and min(abs(across[i]), abs(across[j])) > BESIDE_LINE * size
         ):
             pairs.append((away, i, j))
     for _, i, j in sorted(pairs):
@@ -584,14 +579,14 @@ def _around_the_trunk(cloth: Cloth, upper: Border, low: float, upward: FloatArra
     narrowest = int(girths.argmin())
     if upper.length > _WAVES * girths[narrowest]:
         return "dress" if high - low > _LONG else "top"
-    near = heights[cloth.faces].mean(axis=1) > high - _SHOULDERS * (high - low)
+    near = heights[cloth.faces].mean(axis=1) > high - END * (high - low)
     area = cloth.face_areas[near]
     lies = float((np.abs(cloth.face_normals[near] @ upward) * area).sum() / max(float(area.sum()), 1e-300))
-    if upper.length < _NECKS and lies > FACES:
+    if upper.length < _SLIMMEST and lies > FACES:
         return "dress" if high - low > _LONG else "top"
     if girths[narrowest] > _WAISTED * girths[0]:
         return "skirt"
-    return "dress" if levels[narrowest] - low > _BELOW_WAIST else "top"
+    return "dress" if levels[narrowest] - low > _TO_THE_THIGH else "top"
 
 
 def _one_border(cloth: Cloth, border: Border, upward: FloatArray) -> Kind:
@@ -693,7 +688,7 @@ def averaged_limbs(anatomy: Anatomy, *, alike: bool) -> tuple[Limb, ...]:
         if mate is not None:
             along = reflected(mate.along, anatomy.normal)
             fork = anatomy.image(mate.fork)
-            near = along @ limb.along > SAME_WAY and np.linalg.norm(fork - limb.fork) < _BESIDE * anatomy.size
+            near = along @ limb.along > SAME_WAY and np.linalg.norm(fork - limb.fork) < BESIDE_LINE * anatomy.size
             if alike or near:
                 length = 0.5 * (limb.length + mate.length)
                 limb = replace(limb, along=unit(along + limb.along), fork=0.5 * (fork + limb.fork), length=length)

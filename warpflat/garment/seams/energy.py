@@ -48,11 +48,9 @@ Ids = NDArray[np.int64]
 # A dart or a seam is made if it brings this share of the whole garment's cloth back within its limits; before seams are looked for, too,
 # a dart brings this share of what is beyond in its piece: a small one first would be in the way of a seam.
 _WORTH, _WORTH_ALONE = 0.002, 0.15
-# What hangs by a neck of so many times what can be sewn hangs by less once it is sewn.
-_HARDLY = 1.5
 # A seam costs nothing if closing it brings no more cloth beyond the limit than one that is made must bring back, and no more strain energy
-# than this share of all, and this much [J/m2].
-_NO_ENERGY, _NO_DENSITY = 0.02, 1e-2
+# than this for all of the cloth [J/m2].
+_NO_ENERGY = 1e-2
 # So many pieces a tailor cuts at most.
 _USUAL = {"top": 6, "dress": 6, "skirt": 4, "trousers": 4, "jumpsuit": 12, "sleeve": 2}
 # Seams that a garment keeps even so: it is put together at them. A leg can do without a side seam, a trunk cannot.
@@ -84,8 +82,8 @@ def cut_by_energy(
     fabric: Fabric,
     options: SeamOptions,
     prepare: Callable[[Cloth, PieceMesh], Surface],
-) -> tuple[Cloth, list[Trial], float]:
-    """Return the cloth with further seams and darts, what each of them does, and the share that is beyond the limit at the end.
+) -> tuple[Cloth, list[Trial]]:
+    """Return the cloth with further seams and darts, and what each of them does.
 
     Args:
         cloth: cut by a tailor.
@@ -172,7 +170,7 @@ def cut_by_energy(
         gain = (beyond - sum(one.outside for one in pieces)) / total
         released = sum(one.energy for one in old) - sum(one.energy for one in pieces)
         trials += [Trial(name=name, released=released / len(names), outside=gain / len(names)) for name in names]
-    return without_memory(cloth), trials, sum(piece.outside for piece in pieces) / total
+    return without_memory(cloth), trials
 
 
 def _drawn(
@@ -213,7 +211,7 @@ def _closed_for_nothing(
 
     The price of a seam is what closing it would bring: strain energy, and cloth beyond the limit. Left and right go together.
     """
-    area, energy = sum(one.area for one in pieces), sum(one.energy for one in pieces)
+    area = sum(one.area for one in pieces)
     outside = sum(one.outside for one in pieces)
     found: dict[str, Trial] = {}
 
@@ -250,7 +248,7 @@ def _closed_for_nothing(
             both = group_of(name)
             found |= {one: replace(trial, name=one) for one in of_equal_price(name)}
             # What closed things are made of must lie within its limit, no more.
-            most = np.inf if name.startswith(SOLID) else _NO_ENERGY * energy + _NO_DENSITY * area
+            most = np.inf if name.startswith(SOLID) else _NO_ENERGY * area
             of_leg = name.startswith("side") and anatomy.kind == "trousers"
             kept = (name.startswith(_STRUCTURAL) and not of_leg) or any(options.keeps(one) for one in both)
             if kept or trial.released is None or trial.outside > _WORTH or trial.released > most:
@@ -269,7 +267,7 @@ def _closed_for_nothing(
                 cloth = cloth.without_seam(one)
                 found.pop(one, None)
             pieces = measure(cloth, [*pieces, *new])
-            outside, energy = sum(one.outside for one in pieces), sum(one.energy for one in pieces)
+            outside = sum(one.outside for one in pieces)
             waiting, closed = [one for one in waiting if one in cloth.seams], True
             break
     return cloth, pieces, [found[name] for name in cloth.seams if name in found]
@@ -335,7 +333,7 @@ def _can_be_sewn(cloth: Cloth, line: Line, before: Sequence[Measured], after: Se
     if line.parts:
         return least_width(after, size) >= least_width(before, size)
     # A flap that hangs by what is hardly sewn counts while it is small, too.
-    for necks in ((NARROW * size,), (_HARDLY * SEWABLE, 0.005)):
+    for necks in ((NARROW * size,), (SEWABLE, 0.005)):
         parts = (
             max(parts_within(one.surface.faces, one.result.positions, *necks) for one in some)
             for some in (before, after)

@@ -173,7 +173,7 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
         _require_open(cloth)
     elif fabric is not None:
         try:
-            cloth, trials, _ = cut_by_energy(
+            cloth, trials = cut_by_energy(
                 cloth, anatomy, fabric, options, lambda trial, mesh: _surface_of(trial, anatomy, mesh, surface)
             )
         except InputError as reason:

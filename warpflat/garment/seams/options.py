@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from warpflat.core import FloatArray, InputError, is_number, nearest, quote_value
 
-__all__ = ["DIRECTIONS", "FAMILIES", "SeamCut", "SeamOptions", "in_family"]
+__all__ = ["DIRECTIONS", "FAMILIES", "Direction", "SeamCut", "SeamOptions", "in_family"]
 
-DIRECTIONS = ("+x", "-x", "+y", "-y", "+z", "-z")
+Direction = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+DIRECTIONS = get_args(Direction)
 #: Names of seams that are found, without their side.
 FAMILIES = (
     "armhole",

@@ -28,7 +28,7 @@ from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 from warpflat.core import FloatArray, IntArray, polyline_length, unit
 from warpflat.flat import border_loops, inner_borders
 from warpflat.garment.seams.anatomy import HOLE, Anatomy
-from warpflat.garment.seams.cloth import SAME_WAY, Cloth, PieceMesh, section
+from warpflat.garment.seams.cloth import ALIKE, SAME_WAY, Cloth, PieceMesh, section
 from warpflat.garment.seams.fields import TriangleMesh
 from warpflat.garment.seams.symmetric import mirror_image, mirrored
 
@@ -68,11 +68,8 @@ _SMOOTH = 0.04
 # A cut pays for itself: a seam as long as the part is wide counts as this strain. So does a cut of a round part that leaves parts which
 # are not alike, as these are drawn once.
 _SEAM = 0.005
-# Areas of parts of a round part are alike within the first share, and a part is as long along two of its axes within the second: then those
-# of space serve.
-_ALIKE, _ROUND = 0.03, 0.05
-# A field is its own mirror image from this cosine on.
-_ITSELF = 0.99
+# A part is as long along two of its axes within this share: then those of space serve.
+_ROUND = 0.05
 # Where cloth faces an axis by more than this (cosine) it is a base.
 _BASE = 0.6
 # The border of a panel squared is at least this share of a disk's; a cap's is shorter.
@@ -298,7 +295,10 @@ def _strain(mesh: PieceMesh, known: dict[int, float]) -> float:
     a, b, c = normals.transpose(1, 0, 2)
     # The solid angle of a triangle of unit vectors, for small ones the triangle's own area.
     curvature = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
-    area, length = float(mesh.face_areas.sum()), _reach(mesh)
+    # Between two places that are about as far from each other as any, the way along the mesh.
+    far = dijkstra(mesh.graph, directed=False, indices=0)
+    far = dijkstra(mesh.graph, directed=False, indices=int(np.where(np.isfinite(far), far, -1.0).argmax()))
+    area, length = float(mesh.face_areas.sum()), float(far[np.isfinite(far)].max())
     for loop in mesh.loops[1:2]:
         # A tube is as long, laid flat, as it is around.
         length = max(length, polyline_length(mesh.vertices[loop], closed=True))
@@ -352,13 +352,6 @@ def _limbs(mesh: PieceMesh, mirror: Anatomy | None) -> tuple[FloatArray, int]:
             field = np.maximum(field, field[image])
         taken = np.maximum(taken, field)
     return taken, count
-
-
-def _reach(mesh: TriangleMesh) -> float:
-    """Return the way along a mesh between two places that are about as far from each other as any [m]."""
-    far = dijkstra(mesh.graph, directed=False, indices=0)
-    far = dijkstra(mesh.graph, directed=False, indices=int(np.where(np.isfinite(far), far, -1.0).argmax()))
-    return float(far[np.isfinite(far)].max())
 
 
 def _smoothed_normals(mesh: TriangleMesh) -> FloatArray:
@@ -444,7 +437,7 @@ def _best_way(
     for way in _ways(mesh, None if image is None else mirror) if neck is None else [_across_neck(mesh, neck)]:
         if image is not None:
             other = way.field[image]
-            alike = abs(float(way.field @ other)) > _ITSELF * float(np.linalg.norm(way.field) * np.linalg.norm(other))
+            alike = abs(float(way.field @ other)) > SAME_WAY * float(np.linalg.norm(way.field) * np.linalg.norm(other))
             if neck is None and not alike:
                 continue
             if not alike:
@@ -460,7 +453,7 @@ def _best_way(
         if len(parts) == 1 or min(areas) < 0.3 * _LEAST * total:
             continue
         cost = _SEAM * made.seam_length("way") / np.sqrt(sum(areas)) + sum(_topology(part) for part in parts)
-        cost += _SEAM * way.round * (max(areas) > (1.0 + _ALIKE) * min(areas))
+        cost += _SEAM * way.round * (max(areas) > (1.0 + ALIKE) * min(areas))
         cost += sum(_strain(part, known) * area for part, area in zip(parts, areas, strict=True)) / sum(areas)
         found.append((cost, made, way.field))
     best: tuple[float, FloatArray] | None = None

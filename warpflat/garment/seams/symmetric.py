@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from warpflat.core import FloatArray, other_side, project_on_segments
 from warpflat.garment.seams.anatomy import Anatomy
-from warpflat.garment.seams.cloth import BESIDE_LINE, FACES, LEVELS, Cloth, PieceMesh, are_among, edge_components
+from warpflat.garment.seams.cloth import ALIKE, BESIDE_LINE, FACES, LEVELS, Cloth, PieceMesh, are_among, edge_components
 
 __all__ = ["SAME_PLACE", "averaged", "mirror_image", "mirrored"]
 
@@ -19,14 +19,12 @@ Ids = NDArray[np.int64]
 # Lengths are shares of the garment's size, the square root of its area.
 #: Vertices are at one place within this.
 SAME_PLACE = 1e-5
-# Cloth is averaged if its mirror image lies as near as this, in the mean and at all but a hundredth of its vertices: half of this it moves.
-_MEAN, _FARTHEST = 0.01, 0.035
+# Cloth is averaged if its mirror image lies as near as this at all but a hundredth of its vertices: half of this it moves.
+_FARTHEST = 0.035
 # A seam that keeps so near to the plane of symmetry is in it.
 _IN_PLANE = 0.008
 # Cloth that is so far from the plane, as a share of what is the farthest at its height, is of its side.
 _FAR = 0.5
-# What is mirrored has the area of what it was made from within this: sides that lie as near as that to each other differ by wrinkles.
-_SAME_AREA = 0.05
 # Cloth that moves by less is not worth a word [m].
 _TOLD = 5e-4
 
@@ -70,7 +68,7 @@ def averaged(cloth: Cloth, anatomy: Anatomy) -> tuple[Cloth, str, bool]:
         )
     away = np.linalg.norm(gap, axis=1)
     share = cloth.mass / cloth.mass.sum()
-    if float(share @ away) > _MEAN * size or float(np.quantile(away, 0.99)) > _FARTHEST * size:
+    if float(np.quantile(away, 0.99)) > _FARTHEST * size:
         return cloth, apart, False
     moved = 0.5 * away
     words = f"the cloth moved by {1e3 * float(share @ moved):.1f} mm in the mean, {1e3 * moved.max():.0f} mm at most"
@@ -195,7 +193,7 @@ def _unlike(made: Cloth, cloth: Cloth) -> str:
     if (made.half_edges.count > 2).any():
         return "its halves meet at more than the middle"
     areas = [float(one.face_areas.sum()) for one in (made, cloth)]
-    if abs(areas[0] - areas[1]) > _SAME_AREA * areas[1]:
+    if abs(areas[0] - areas[1]) > ALIKE * areas[1]:
         return "one side has more cloth than the other"
     shapes = [(one.shape, sorted(mesh.shape for mesh in one.pieces())) for one in (made, cloth)]
     return "" if shapes[0] == shapes[1] else "one side has openings, seams or pieces that the other has not"

@@ -32,15 +32,13 @@ _SMOOTH = 0.035
 _LEAN = np.radians(8.0)
 # The armhole is looked for in such steps outwards, from half of one outside of the armpit.
 _STEP = 0.008
-# Where it closes around the sleeve only so much farther outside, it ends at the neck, of which the sleeve then has a share.
-_BARE = 0.05
 # Its length falls by no more than this over the way outwards once it runs around the sleeve.
 _STEEP = 3.0
 # Nor does its plane follow an arm further than this: one that hangs, and one that is raised.
 _HANGS, _RAISED = np.radians(-4.0), np.radians(30.0)
-# A hood is wider, across its opening, than the neck below it by this, and the shoulders are by more. It
-# has such a share of the cloth, and its opening goes up by at least this share of its height.
-_WIDER, _ROOT, _SHOULDERS, _HOOD, _FACE = 1.1, 1.35, 1.5, (0.05, 0.4), 0.5
+# A hood is wider, across its opening, than the neck below it by this, and the shoulders are by more. Its
+# opening goes up by at least this share of its height.
+_WIDER, _ROOT, _SHOULDERS, _FACE = 1.1, 1.35, 1.5, 0.5
 #: A line that the user has drawn is meant where a tailor would have cut within this.
 BESIDE = 0.08
 # A sleeve has no more than this share of the neck, or of the opening.
@@ -187,7 +185,7 @@ def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> 
         if not beyond[rim].all() or crossed:
             lengths, middles, offsets = [], [], []
             continue
-        if bare is not None and offset > bare[0] + _BARE * anatomy.size:
+        if bare is not None:
             # A neck that leaves the shoulders bare ends on the sleeves, and so does the armhole.
             return bare
         length, middle = section(cloth, height - offset, np.asarray(beyond[cloth.faces].any(axis=1)))
@@ -374,8 +372,7 @@ def _cut_hood(cloth: Cloth, anatomy: Anatomy) -> Cloth:
     field = heights - level - slope * (ahead - ahead[nape])
     trial, beyond, within, edges = cloth.parted(field, trunk)
     hood = beyond & within
-    share = float(trial.face_areas[hood].sum() / trial.face_areas.sum())
-    if not _HOOD[0] < share < _HOOD[1] or components(trial.faces[hood].astype(np.int32)).max() > 0:
+    if components(trial.faces[hood].astype(np.int32)).max() > 0:
         return cloth
     number = len(anatomy.limbs_of("sleeve"))
     trial = trial.with_labels(sleeve=np.where(hood, number, trial.labels["sleeve"])).with_seam("hood", edges)

@@ -16,8 +16,8 @@ __all__ = ["even_line", "without_thickness"]
 
 # A layer of faces around an opening is turned inside if it faces its middle by this (mean cosine), and outside from the second on.
 _INSIDE, _OUTSIDE = -0.25, 0.35
-# So is a first layer that lies across the opening, no wider than this share, if the next one stands up from it.
-_ACROSS, _RIM, _UPRIGHT = 0.9, 0.025, 0.85
+# So is a first layer that lies across the opening, no wider than this share, if the next one stands up from it: both by this (mean cosine).
+_RIM, _SQUARE = 0.025, 0.85
 # Turned cloth is no wider than this share of the square root of the area.
 _WIDEST = 0.15
 # What takes more than this share of a piece that the user has drawn is that piece, as a waistband, and is worn as it lies.
@@ -98,9 +98,9 @@ def _turned(cloth: Cloth, border: Border, size: float) -> BoolArray | None:
         radial = unit(radial - (radial @ axis)[:, None] * axis)
         facing = float((np.einsum("ij,ij->i", normals[layer], radial) * weight).sum() / max(weight.sum(), 1e-300))
         if rim is not None:
-            return rim if facing > _UPRIGHT else None
+            return rim if facing > _SQUARE else None
         across = abs(float(((normals[layer] @ axis) * weight).sum())) / max(float(weight.sum()), 1e-300)
-        lies_across = _INSIDE <= facing < _OUTSIDE and across > _ACROSS
+        lies_across = _INSIDE <= facing < _OUTSIDE and across > _SQUARE
         if not turned and lies_across and weight.sum() < _RIM * size * border.length:
             rim = layer.copy()
         elif facing >= _OUTSIDE or (not turned and facing >= _INSIDE):

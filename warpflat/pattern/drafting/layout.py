@@ -78,7 +78,7 @@ def covered_rings(group: Sequence[DraftedPiece]) -> list[FloatArray]:
 def lay_out(
     groups: Sequence[tuple[DraftedPiece, ...]],
     *,
-    width: float,
+    width: float = 1.5,
     gap: float = 0.010,
     page_height: float | None = None,
     reserved: tuple[float, float] | None = None,

@@ -148,7 +148,6 @@ def make_marker(
     fabric: str = "",
     sizes: Mapping[str, int] | None = None,
     seconds: int = 5,
-    seed: int = 0,
 ) -> Marker:
     """Nest the pieces of a garment on one ply of cloth, face up, as short as found in the given time.
 
@@ -159,8 +158,7 @@ def make_marker(
         cloth: width, and what the fabric allows.
         fabric: only pieces of that fabric; "" where all have the same.
         sizes: how many garments of each size; None makes one of each drafted size.
-        seconds: time for the solver.
-        seed: of the solver's search; what it reaches still depends on the machine's speed.
+        seconds: time for the solver, in which it reaches more on a faster machine.
 
     Raises:
         InputError: an unknown size or fabric, or a piece wider than the cloth.
@@ -174,7 +172,7 @@ def make_marker(
         if cloth.reversible and any(mirrored for _, mirrored in copies):
             tries.append([(piece, False) for piece, _ in copies])
         share = max(1, seconds // len(tries))
-        placements = min((_nest(garment.name, plan, cloth, share, seed) for plan in tries), key=_length)
+        placements = min((_nest(garment.name, plan, cloth, share) for plan in tries), key=_length)
     # In the order in which the cutter meets them.
     placements = sorted(placements, key=lambda copy: tuple(copy.cut_line.min(axis=0)))
     with printed_in(garment.garment.words):
@@ -224,7 +222,7 @@ def _length(placements: Sequence[Copy]) -> float:
     return max(float(copy.cut_line[:, 0].max()) for copy in placements)
 
 
-def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seconds: int, seed: int) -> list[Copy]:
+def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seconds: int) -> list[Copy]:
     """Nest the copies with sparrow."""
     import shapely
     import spyrrow
@@ -254,7 +252,7 @@ def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seco
     config = spyrrow.StripPackingConfig(
         total_computation_time=seconds,
         num_workers=thread_count(),
-        seed=seed,
+        seed=0,
         min_items_separation=cloth.gap * 1000 or None,
     )
     placements = []

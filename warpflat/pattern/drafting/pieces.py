@@ -183,7 +183,7 @@ class SeamOpening:
     Attributes:
         kind: "zip" or "buttons", from the upper end of the seam; "slit" or "vent", from its lower end.
         length: of the whole opening [m]; it may run on into another seam.
-        begin: how far from that end of the seam it begins [m].
+        begin: how far from that end of the seam it begins [m]; negative where it begins beyond that end, in another seam or in a band.
         whole: whether it reaches from there to the seam's other end.
         style: of a zip, "invisible" or "lapped".
     """

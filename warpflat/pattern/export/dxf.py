@@ -82,7 +82,7 @@ def write_dxf(
     seams = seam_words(garment.garment.seams)
     names = {piece.name: piece.piece.title or piece.name for row in garment.pieces.values() for piece in row}
     written = titles(list(dict.fromkeys(names.values())), lambda name: any(map(str.isalnum, _ascii(name))))
-    for placed in lay_out(nests(garment, chosen), width=1.5).placed:
+    for placed in lay_out(nests(garment, chosen)).placed:
         for piece in placed.pieces:
             title = written[names[piece.name]]
             name = block_name(piece, taken, title)

@@ -165,8 +165,8 @@ def draw_figure(
             break
     band = None if body is None else _Band(body, pieces, drafted, colours)
     width, height, page_scale = _lay_out(pen, cells, band)
-    rows = _DraftedRows(pen, drafted, width - 2 * MARGIN, page_scale) if drafted else None
-    pen.resize(width, height + _STRIP + (0.0 if rows is None else rows.height))
+    foot = _draw_drafted(pen, drafted, width - 2 * MARGIN, page_scale) if drafted else 0.0
+    pen.resize(width, height + _STRIP + foot)
     pen.scale_bar(MARGIN, pen.height - 0.27, page_scale)
     pen.write(MARGIN, pen.height - 0.48, shared, LABEL_SIZE, color=GREY)
     _draw_colours(pen, colours, density, areas)
@@ -175,8 +175,6 @@ def draw_figure(
         band.draw(pen, MARGIN, top)
     for cell in cells:
         _draw_cell(pen, cell, top, page_scale)
-    if rows is not None:
-        rows.draw(pen, MARGIN, rows.height)
     return pen.figure
 
 
@@ -526,40 +524,29 @@ def _grain_inside(
     return None
 
 
-class _DraftedRows:
-    """Drafted outlines in rows, longer side across.
+def _draw_drafted(pen: Pen, pieces: Sequence[DraftedOutline], width: float, page_scale: float) -> float:
+    """Draw drafted outlines in rows at the foot of a page, longer side across; return how high they reach [in].
 
-    Attributes:
-        height: of all rows [in].
+    Where the longest does not fit into the width [in] at the page's scale [in/m], all are drawn smaller.
     """
-
-    def __init__(self, pen: Pen, pieces: Sequence[DraftedOutline], width: float, page_scale: float) -> None:
-        """Lay the pieces out in a width [in]; where the longest does not fit at the page's scale [in/m], all are drawn smaller."""
-        outlines = []
-        for piece in pieces:
-            wide, high = np.ptp(piece.points, axis=0)
-            points = piece.points if wide >= high else np.column_stack([piece.points[:, 1], -piece.points[:, 0]])
-            outlines.append(points - [points[:, 0].min(), points[:, 1].max()])
-        self._scale = min(page_scale, (width - _GAP) / max(float(np.ptp(points[:, 0])) for points in outlines))
-        self._is_smaller = self._scale < page_scale * (1.0 - 1e-9)
-        self._names = [piece.name for piece in pieces]
-        self._outlines = [self._scale * points for points in outlines]
-        sizes = list[tuple[float, float]]()
-        for name, points in zip(self._names, self._outlines, strict=True):
-            wide, high = np.ptp(points, axis=0).tolist()
-            # A name that is wider than the page is shortened where it is written.
-            sizes.append((min(max(wide, pen.measure(name, _NAME_SIZE)[0]) + _GAP, width), high + _NAME + _GAP))
-        self._places, _, tall = pack_rows(sizes, width)
-        self.height = tall + _ROWS_HEADING
-
-    def draw(self, pen: Pen, left: float, top: float) -> None:
-        """Draw the rows with their upper left corner at (`left`, `top`) [in]."""
-        heading = "drafted for the edges that they are sewn to"
-        pen.write(left, top - 0.14, heading, _WORDS_SIZE, color=GREY, fontstyle="italic")
-        if self._is_smaller:
-            pen.scale_bar(left + pen.measure(heading, _WORDS_SIZE)[0] + 0.25, top - 0.17, self._scale)
-        for name, points, (across, down) in zip(self._names, self._outlines, self._places, strict=True):
-            y = top - _ROWS_HEADING - down
-            pen.write(left + across, y - 0.5 * _NAME, name, _NAME_SIZE)
-            corner = np.array([left + across, y - _NAME])
-            pen.polygon(corner + points, facecolor=_CLOTH, edgecolor=INK, linewidth=0.8, zorder=3)
+    outlines = []
+    for piece in pieces:
+        wide, high = np.ptp(piece.points, axis=0)
+        points = piece.points if wide >= high else np.column_stack([piece.points[:, 1], -piece.points[:, 0]])
+        outlines.append(points - [points[:, 0].min(), points[:, 1].max()])
+    scale = min(page_scale, (width - _GAP) / max(float(np.ptp(points[:, 0])) for points in outlines))
+    sizes = list[tuple[float, float]]()
+    for piece, points in zip(pieces, outlines, strict=True):
+        wide, high = (scale * np.ptp(points, axis=0)).tolist()
+        # A name that is wider than the page is shortened where it is written.
+        sizes.append((min(max(wide, pen.measure(piece.name, _NAME_SIZE)[0]) + _GAP, width), high + _NAME + _GAP))
+    places, _, tall = pack_rows(sizes, width)
+    heading, top = "drafted for the edges that they are sewn to", tall + _ROWS_HEADING
+    pen.write(MARGIN, top - 0.14, heading, _WORDS_SIZE, color=GREY, fontstyle="italic")
+    if scale < page_scale * (1.0 - 1e-9):
+        pen.scale_bar(MARGIN + pen.measure(heading, _WORDS_SIZE)[0] + 0.25, top - 0.17, scale)
+    for piece, points, (across, down) in zip(pieces, outlines, places, strict=True):
+        pen.write(MARGIN + across, tall - down - 0.5 * _NAME, piece.name, _NAME_SIZE)
+        corner = np.array([MARGIN + across, tall - down - _NAME])
+        pen.polygon(corner + scale * points, facecolor=_CLOTH, edgecolor=INK, linewidth=0.8, zorder=3)
+    return top

@@ -27,22 +27,19 @@ _MARKS = 3
 _WIDE = 0.55
 
 
-def write_plt(
-    garment: DraftedGarment, path: str | os.PathLike[str], *, sizes: Sequence[str] | None = None, width: float = 1.5
-) -> None:
+def write_plt(garment: DraftedGarment, path: str | os.PathLike[str], *, sizes: Sequence[str] | None = None) -> None:
     """Write the pieces side by side; several sizes lie upon each other as a nest, without their sewing lines.
 
     Args:
         garment: drafted.
         path: of the file.
         sizes: those to draw; None draws all.
-        width: of the sheet [m].
 
     Raises:
         InputError: an unknown size.
     """
     written: dict[int, list[str]] = {pen: [] for pen in (_MARKS, 2, 1)}
-    for placed in lay_out(nests(garment, sizes), width=width).placed:
+    for placed in lay_out(nests(garment, sizes)).placed:
         with printed_in(garment.garment.words):
             drawings = draw_nest(placed.pieces)
         for drawing in drawings:

@@ -52,7 +52,6 @@ def write_svg(
     *,
     sizes: Sequence[str] | None = None,
     nested: bool = False,
-    width: float = 1.5,
 ) -> None:
     """Write the pieces side by side, in true size.
 
@@ -66,20 +65,21 @@ def write_svg(
         sizes: those to draw; None draws all.
         nested: lay all sizes of a piece upon each other, as a grading nest; of several sizes the sewing lines are not
             displayed.
-        width: of the sheet [m].
     """
     groups = nests(garment, sizes)
     if not nested:
         groups = [(piece,) for size in garment.pieces for nest in groups for piece in nest if piece.size == size]
-    sheet = lay_out(groups, width=width)
+    sheet = lay_out(groups)
     page = SvgPage(float(sheet.size[0]), float(sheet.size[1]), garment.name)
     seams = seam_words(garment.garment.seams)
+    drawn = [size for size in garment.pieces if sizes is None or size in sizes]
     for placed in sheet.placed:
         with printed_in(garment.garment.words):
             drawings = draw_nest(placed.pieces)
-        for index, drawing in enumerate(drawings):
+        for drawing in drawings:
             shift = np.column_stack([np.eye(2), placed.offset])
-            page.piece(drawing, shift, hue=index if len(placed.pieces) > 1 else None, seams=seams)
+            hue = drawn.index(drawing.piece.size) if len(placed.pieces) > 1 else None
+            page.piece(drawing, shift, hue=hue, seams=seams)
     page.write(path)
 
 

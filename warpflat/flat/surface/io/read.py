@@ -34,10 +34,10 @@ __all__ = [
     "POSSIBLE",
     "SUFFIXES",
     "check_size",
+    "extent_words",
     "read_mesh_file",
     "read_scan",
     "read_surface",
-    "size_words",
     "surface_of_file",
     "wrong_size",
 ]
@@ -267,7 +267,7 @@ def _likely_unit(size: float) -> str | None:
     )
 
 
-def size_words(vertices: FloatArray, units: str | None) -> str:
+def extent_words(vertices: FloatArray, units: str | None) -> str:
     """Return the size of what was read in words, and a unit that is likelier where it is not that of a garment.
 
     Args:
