@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
+from polygons import corners_of, drafted, polygon
 
 from warpflat.core.left_out import LeftOut, listening_to_left_out
+from warpflat.core.polyline import polyline_length
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.half_pieces import halved, is_symmetric
 from warpflat.pattern.drafting.piece_parts import Dart, Edge
@@ -56,3 +59,15 @@ def test_a_piece_with_a_dart_in_its_middle_is_printed_whole():
     with listening_to_left_out(heard.append):
         assert halved(drafted).pieces[""][0] is drafted.pieces[""][0]
     assert not heard
+
+
+def test_a_closed_line_around_the_middle_keeps_all_of_its_half():
+    pocket = np.array([(-0.1, 0.3), (-0.1, 0.1), (0.1, 0.1), (0.1, 0.3), (-0.1, 0.3)])
+    for start in range(4):
+        ring = np.roll(pocket[:-1], start, axis=0)
+        line = np.concatenate([ring, ring[:1]])
+        whole = drafted(polygon("front", corners_of(0.4, 0.5, left=-0.2), internal_lines={"pocket": line}))
+        (half,) = halved(whole).pieces[""]
+        assert half.piece.on_fold
+        (drawn,) = half.internal_lines.values()
+        assert polyline_length(drawn) == pytest.approx(0.4)

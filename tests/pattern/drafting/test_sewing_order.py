@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from polygons import polygon, sewn
 
 from warpflat.core.errors import InputError
 from warpflat.garment.construction.details import FinishingTable
@@ -17,7 +18,7 @@ from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.piece_parts import Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
 from warpflat.pattern.drafting.seam_words import joint_words
-from warpflat.pattern.drafting.sewing_order import notions, seam_letters, sewing_steps
+from warpflat.pattern.drafting.sewing_order import notions, seam_letters, sewing_steps, sewn_seams
 from warpflat.pattern.drafting.words import language_words, printed_in
 from warpflat.pattern.export.pattern_json import pattern_from_json, pattern_json
 
@@ -349,3 +350,25 @@ def test_hems_of_two_widths_on_one_piece_are_told_by_their_names():
         (words[name],) = [step.words for step in steps if step.technique == "hem"]
     assert "3 cm hem (front, back right, back left), 2 cm neck (front)" in words["two"]
     assert " hem (" not in words["one"]
+
+
+def test_letters_on_the_pieces_are_those_of_the_guide_in_all_sizes():
+    def row(size: str, first: float, second: float) -> list[Piece]:
+        """Three strips beside each other, and the heights at which they are joined [m]."""
+        heights = (0.3, first, second, 0.3)
+        return [
+            polygon(name, [(0.0, 0.0), (0.2, 0.0), (0.2, heights[k + 1]), (0.0, heights[k])], size=size)
+            for k, name in enumerate("abc")
+        ]
+
+    pattern = Pattern(
+        name="top",
+        pieces={"S": row("S", 0.4, 0.2), "M": row("M", 0.2, 0.4)},
+        seams=[sewn("a.e1", "b.e3", "one"), sewn("b.e1", "c.e3", "two")],
+        sample_size="M",
+    )
+    drafted = draft_garment(pattern)
+    letters = seam_letters(drafted)
+    for name, length in {"one": 200.0, "two": 400.0}.items():
+        (seam,) = (seam for seam in sewn_seams(drafted, "M") if seam.letter == letters[name])
+        assert seam.length_mm[0] == pytest.approx(length)

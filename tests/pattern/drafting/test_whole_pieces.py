@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from polygons import polygon
 
 from warpflat.pattern.drafting.piece_parts import Dart, Edge
 from warpflat.pattern.drafting.pieces import Piece
@@ -42,3 +43,19 @@ def test_a_mirrored_dart_runs_from_the_border_to_its_tip_and_back(on_fold: bool)
     for piece in whole.values():
         x, y = np.concatenate([edge.points[:-1] for edge in piece.edges]).T
         assert (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() > 0.0, "counter-clockwise"
+
+
+def test_both_sides_of_a_half_lie_at_its_levels_and_the_half_stays_as_it_was() -> None:
+    corners = np.array([(0.1, 0.03), (0.31, 0.07), (0.27, 0.4), (0.13, 0.53)])
+    half = polygon(
+        "front",
+        corners,
+        names=("hem", "side", "waist", "fold"),
+        kinds=("hem", "seam", "cut", "fold"),
+        levels={"waist": "waist"},
+    )
+    for edge in half.edges:
+        edge.points.flags.writeable = False
+    whole = whole_pieces([half], [], unsewn=True)[0]["front"]
+    assert whole.levels == {"waist": "waist", "waist" + MIRRORED: "waist"}
+    assert {edge.name for edge in whole.edges} > set(whole.levels)

@@ -22,6 +22,7 @@ from warpflat.pattern.drafting.pieces import Pattern
 from warpflat.pattern.export.pdf import PAPERS, draw_sheet, write_pdf
 from warpflat.pattern.export.pdf_legend import TEST_INCHES, TEST_MM
 from warpflat.pattern.export.pdf_tiling import LEGEND_SIZE
+from warpflat.pattern.export.svg import SIZE_COLOURS, write_svg
 
 needs_poppler = pytest.mark.skipif(shutil.which("pdftoppm") is None, reason="pdftoppm (poppler) is not installed")
 MM = 1 / 25.4
@@ -243,6 +244,25 @@ def test_a_sheet_shows_words_whole_or_not_at_all(dress, tmp_path):
             if sum(words.text in text for text in texts.elements()) == 1 and len(words.text) > 6:
                 found = ["".join(words.text.split()) in text for text in shown]
                 assert found == [tile in shows for tile in tiling.tiles]
+
+
+def test_a_size_has_its_colour_on_pieces_that_not_all_sizes_have(tmp_path):
+    sizes = ("S", "M", "L")
+    rows = {size: [polygon("front", corners_of(0.1 + 0.02 * k, 0.2), size=size)] for k, size in enumerate(sizes)}
+    rows["S"] = [polygon("yoke", corners_of(0.1, 0.2), size="S")]
+    nest = draft_garment(Pattern(name="top", pieces=rows))
+    write_pdf(nest, tmp_path / "p.pdf")
+    reader = PdfReader(tmp_path / "p.pdf")
+    forms = (form.get_object() for page in reader.pages for form in page["/Resources"].get("/XObject", {}).values())
+    drawn = next(form for form in forms if b"/size1 BDC" in form.get_data()).get_data().decode("latin-1")
+    write_svg(nest, tmp_path / "p.svg", nested=True)
+    text = (tmp_path / "p.svg").read_text()
+    for k, size in enumerate(sizes[1:], 1):
+        shade = [int(SIZE_COLOURS[k][at : at + 2], 16) / 255 for at in (1, 3, 5)]
+        used = re.search(rf"/size{k} BDC\s+(\S+) (\S+) (\S+) RG", drawn)
+        assert [float(each) for each in used.groups()] == pytest.approx(shade, abs=1e-3)
+        group = text[text.index(f'id="front-{size}"') :].partition("</g>")[0]
+        assert f"stroke: {SIZE_COLOURS[k]}" in group
 
 
 def test_unknown_paper_is_refused(dress, tmp_path):

@@ -120,7 +120,7 @@ class DraftedPiece:
         grain: 2 by 2 [m], from and to, upwards.
         label: its text and place.
         notes: what the cutter should know, one sentence each.
-        enlarged: by what it is drawn larger across and along its grain, for cloth that shrinks.
+        enlarged: by what all lines are drawn larger across and along the grain, after `frame`, for cloth that shrinks.
     """
 
     __repr__ = short_repr
@@ -198,6 +198,11 @@ class DraftedGarment:
     @property
     def name(self) -> str:
         return self.garment.name
+
+    @property
+    def sample(self) -> str:
+        """Size that is shown where only one is; the first where the sample size is not drafted."""
+        return self.garment.sample if self.garment.sample in self.pieces else next(iter(self.pieces))
 
     @property
     def piece_names(self) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 from warpflat.core import FloatArray, line_name, polyline_length, unit, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.sewing_tasks import is_flounce
+from warpflat.pattern.drafting.shrinkage import as_worn
 from warpflat.pattern.drafting.words import translate, translate_name
 
 __all__ = ["finished_lengths"]
@@ -29,7 +30,7 @@ def finished_lengths(garment: DraftedGarment, size: str) -> dict[str, float]:
 
     What is sewn to its end belongs to it: a cuff, a band, a flounce. What of two fronts lies over each other counts once around a hem.
     """
-    drafted = {piece.name: piece for piece in garment.pieces[size]}
+    drafted = {piece.name: as_worn(piece) for piece in garment.pieces[size]}
     pieces = [piece for piece in drafted.values() if piece.piece.role == "shell" and not is_flounce(piece.piece)]
     legs = any(line_name(seam.name) == "inseam" for seam in garment.seams)
     banded = any(piece.piece.role == "waistband" for piece in drafted.values())

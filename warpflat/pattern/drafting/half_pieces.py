@@ -7,13 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, arc_lengths, optional_step, without_side
+from warpflat.core import FloatArray, arc_lengths, find_unused_name, optional_step, without_side
 from warpflat.pattern.drafting.curves import Curve, chords, farthest, split_bezier
 from warpflat.pattern.drafting.draft import draft_half
 from warpflat.pattern.drafting.drafted import DraftedEdge, DraftedGarment, DraftedPiece, Notch
 from warpflat.pattern.drafting.piece_parts import SAME_POINT, Edge, Hole
 from warpflat.pattern.drafting.pieces import Seam
 from warpflat.pattern.drafting.seam_difference import SEAM_TOLERANCE
+from warpflat.pattern.drafting.shrinkage import as_worn, resized
 
 __all__ = ["halved", "is_symmetric"]
 
@@ -36,7 +37,7 @@ def halved(garment: DraftedGarment) -> DraftedGarment:
         if all(float(np.ptp(p.cut_line[:, 0])) >= NARROW and is_symmetric(p) for p in sizes):
             side = _kept_side(sizes[0], garment.garment.seams)
             with optional_step(f"{name} is printed whole, not as a half on the fold", is_needed=False):
-                halves[name] = [_half(p, garment, side) for p in sizes]
+                halves[name] = [resized(_half(as_worn(p), garment, side), np.array(p.enlarged)) for p in sizes]
     pieces = {
         size: tuple(halves[piece.name].pop(0) if piece.name in halves else piece for piece in row)
         for size, row in garment.pieces.items()
@@ -141,10 +142,11 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
     box = shapely.box(min(axis, axis + side * far), -far, max(axis, axis + side * far), far)
     lines: dict[str, FloatArray] = {}
     for name, line in piece.internal_lines.items():
-        for part in shapely.get_parts(shapely.intersection(shapely.LineString(line), box)):
+        # Of a closed line the part around its first point comes in two.
+        for part in shapely.get_parts(shapely.line_merge(shapely.intersection(shapely.LineString(line), box))):
             points = shapely.get_coordinates(part)
             if len(points) > 1 and np.abs(points[:, 0] - axis).max() > INNER:
-                lines.setdefault(without_side(name), points + shift)
+                lines[find_unused_name(without_side(name), lines)] = points + shift
     half = replace(
         piece.piece,
         edges=[*(edge.edge for edge in moved), drafted.edge],
@@ -173,8 +175,7 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
     )
     on_side = _notches_beside(piece, garment.garment.seams, names, axis, side)
     notches = tuple(_on_half(notch, moved, shift, side) for notch in on_side)
-    drawn = draft_half(half, garment.name, (*moved, drafted), notches, piece.notes)
-    return replace(drawn, enlarged=piece.enlarged)
+    return draft_half(half, garment.name, (*moved, drafted), notches, piece.notes)
 
 
 def _clipped_edges(piece: DraftedPiece, axis: float, side: float) -> list[DraftedEdge]:

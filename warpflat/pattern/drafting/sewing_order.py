@@ -116,8 +116,8 @@ def sewn_seams(garment: DraftedGarment, size: str) -> tuple[SewnSeam, ...]:
 
 
 def seam_letters(garment: DraftedGarment) -> dict[str, str]:
-    """Return the letter of each seam by its name."""
-    workshop = _Workshop(garment, next(iter(garment.pieces)))
+    """Return the letter of each seam by its name, in the order of the sample size."""
+    workshop = _Workshop(garment, garment.sample)
     return {
         seam.name: sewn[0].letter for batch in workshop.batches for task, sewn in batch for seam in task.seams if sewn
     }

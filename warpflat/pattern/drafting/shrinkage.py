@@ -10,7 +10,7 @@ from warpflat.core import FloatArray, InputError, arc_lengths
 from warpflat.pattern.drafting.curves import Curve
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 
-__all__ = ["Shrinkage", "enlarged"]
+__all__ = ["Shrinkage", "as_worn", "enlarged", "resized"]
 
 #: More than this share is no cloth's shrinkage.
 MOST = 0.25
@@ -54,14 +54,26 @@ def enlarged(garment: DraftedGarment, shrinkage: Shrinkage, fabric: str) -> Draf
     if not (shrinkage.warp or shrinkage.weft):
         return garment
     pieces = {
-        size: tuple(_larger(piece, shrinkage) if piece.piece.fabric == fabric else piece for piece in row)
+        size: tuple(
+            replace(resized(piece, shrinkage.factors), notes=(*piece.notes, shrinkage.words))
+            if piece.piece.fabric == fabric
+            else piece
+            for piece in row
+        )
         for size, row in garment.pieces.items()
     }
     return replace(garment, pieces=pieces)
 
 
-def _larger(piece: DraftedPiece, shrinkage: Shrinkage) -> DraftedPiece:
-    factors = shrinkage.factors
+def as_worn(piece: DraftedPiece) -> DraftedPiece:
+    """Return a drafted piece as large as it is once its cloth has shrunk."""
+    return resized(piece, 1.0 / np.array(piece.enlarged))
+
+
+def resized(piece: DraftedPiece, factors: FloatArray) -> DraftedPiece:
+    """Return a drafted piece made larger by factors across and along its grain, allowances and notches included."""
+    if (factors == 1.0).all():
+        return piece
     lines = {name: line * factors for name, line in piece.internal_lines.items()}
     cutouts = {
         name: replace(cutout, sew_line=cutout.sew_line * factors, cut_line=cutout.cut_line * factors)
@@ -97,6 +109,5 @@ def _larger(piece: DraftedPiece, shrinkage: Shrinkage) -> DraftedPiece:
         fisheyes={name: line * factors for name, line in piece.fisheyes.items()},
         grain=piece.grain * factors,
         label=replace(piece.label, at=piece.label.at * factors, leader=leader),
-        notes=(*piece.notes, shrinkage.words),
-        enlarged=(float(factors[0]), float(factors[1])),
+        enlarged=(float(piece.enlarged[0] * factors[0]), float(piece.enlarged[1] * factors[1])),
     )

@@ -141,8 +141,7 @@ def _unfolded(piece: Piece) -> Piece:
     edges = [*piece.edges[folds[0] + 1 :], *piece.edges[: folds[0]]]
     other = _image(piece, edges, fold, MIRRORED)
     # Corners on the fold are one point, bit for bit.
-    for near, far in ((edges[-1], other["edges"][0]), (other["edges"][-1], edges[0])):
-        far.points[0] = near.points[-1]
+    other["edges"][0].points[0], other["edges"][-1].points[-1] = edges[-1].points[-1], edges[0].points[0]
     return replace(
         piece,
         edges=[*edges, *other["edges"]],
@@ -150,6 +149,7 @@ def _unfolded(piece: Piece) -> Piece:
         holes=[*piece.holes, *other["holes"]],
         internal_lines={**piece.internal_lines, **other["internal_lines"]},
         marks={**piece.marks, **other["marks"]},
+        levels={**piece.levels, **{edge + MIRRORED: level for edge, level in piece.levels.items()}},
     )
 
 

@@ -146,6 +146,7 @@ class DartEntry(Entry):
     fold: Line | None
     fold_to: Literal["", "left", "right"]
     opening: float
+    cut: bool = False
     pleat: float | None = None
 
 
@@ -533,7 +534,7 @@ def _read_piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:
 
     def in_mesh(points: Any) -> FloatArray:
         """Map points from the drafted piece's coordinates to those of the flat mesh."""
-        return (np.array(points) - frame[:, 2]) @ frame[:, :2]
+        return (np.array(points) / data.enlarged - frame[:, 2]) @ frame[:, :2]
 
     cutouts = {
         key: DraftedCutout(

@@ -252,13 +252,14 @@ def _sheet_form(
     canvas.beginForm("sheet", *(low * POINT), *(high * POINT))
     for placed, sizes in zip(sheet.placed, drawings, strict=True):
         nested = len(placed.pieces) > 1
-        for index, drawing in enumerate(sizes):
+        for drawing in sizes:
+            index = chosen.index(drawing.piece.size)
             shown = [stroke for stroke in drawing.strokes if not stroke.hidden]
             of_size = [stroke for stroke in shown if nested and stroke.role in OF_LAYER]
             for stroke in (stroke for stroke in shown if not (nested and stroke.role in OF_LAYER)):
                 _stroke(canvas, stroke, placed.matrix, index if nested else None, widen)
             if nested:
-                canvas._code.append(f"/OC /size{chosen.index(drawing.piece.size)} BDC")
+                canvas._code.append(f"/OC /size{index} BDC")
             for stroke in of_size:
                 _stroke(canvas, stroke, placed.matrix, index, widen)
             if nested:
@@ -294,8 +295,9 @@ def _word_forms(
     """Draw the words of each sheet as a form, and return the names of the forms by row and column."""
     written = []
     for placed, of_piece in zip(tiling.sheet.placed, drawings, strict=True):
-        for index, drawing in enumerate(of_piece):
-            layer = f"size{sizes.index(drawing.piece.size)}" if len(placed.pieces) > 1 else ""
+        for drawing in of_piece:
+            index = sizes.index(drawing.piece.size)
+            layer = f"size{index}" if len(placed.pieces) > 1 else ""
             written += [(words, placed, layer if words.tag else "", index) for words in drawing.words]
     boxes = np.array([placed.on_sheet(words.box()) for words, placed, _, _ in written]).reshape(-1, 4, 2)
     low, high = boxes.min(axis=1), boxes.max(axis=1)

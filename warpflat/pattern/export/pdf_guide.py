@@ -126,8 +126,7 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
         paper: of the pages.
     """
     page = _Page(canvas, whole, paper)
-    pattern, size = whole.garment, whole.garment.sample
-    size = size if size in printed.pieces else next(iter(printed.pieces))
+    pattern, size = whole.garment, whole.sample
     pieces = printed.pieces[size]
     if pattern.worn is not None:
         _worn(page, pattern.worn, size, [each for each in printed.pieces if each in pattern.worn.measures])

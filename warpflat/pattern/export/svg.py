@@ -72,12 +72,14 @@ def write_svg(
     sheet = lay_out(groups)
     page = SvgPage(float(sheet.size[0]), float(sheet.size[1]), garment.name)
     seams = seam_words(garment.garment.seams)
+    drawn = [size for size in garment.pieces if sizes is None or size in sizes]
     for placed in sheet.placed:
         with printed_in(garment.garment.words):
             drawings = draw_nest(placed.pieces)
-        for index, drawing in enumerate(drawings):
+        for drawing in drawings:
             shift = np.column_stack([np.eye(2), placed.offset])
-            page.piece(drawing, shift, hue=index if len(placed.pieces) > 1 else None, seams=seams)
+            hue = drawn.index(drawing.piece.size) if len(placed.pieces) > 1 else None
+            page.piece(drawing, shift, hue=hue, seams=seams)
     page.write(path)
 
 
