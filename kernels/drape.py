@@ -37,7 +37,10 @@ class Motion:
 class Contact:
     """The body as one plane per vertex, and where friction holds the cloth; each #V but for friction and longest_step.
 
-    centre: the nearest place of the body [m]. normal: outwards; zero where no body is near. friction: Coulomb's coefficient.
+    In a groove it is the inside of a ball that touches both sides of it: planes of one side and the other would take turns.
+
+    centre: the nearest place of the body [m]. normal: outwards; zero where no body is near. ball: radius of the ball, which touches the
+    plane from outside in `centre`, 0 elsewhere [m]. friction: Coulomb's coefficient.
     longest_step: bound of the way in one step of relaxation [m]. skin: stiffness of the body [N/m]. pressed: the normal force at
     no depth [N]. rubbed: the force of friction when the planes were last renewed [N]. anchor: where friction does not act [m].
     grip: stiffness of friction before it slides [N/m]. most: the largest force of friction [N]. depth: how far off its plane what
@@ -46,6 +49,7 @@ class Contact:
 
     centre: wp.array(dtype=wp.vec3d)
     normal: wp.array(dtype=wp.vec3d)
+    ball: wp.array(dtype=wp.float64)
     friction: wp.float64
     longest_step: wp.float64
     skin: wp.array(dtype=wp.float64)
@@ -172,6 +176,26 @@ def gather(
 
 
 @wp.func
+def normal_of(contact: Contact, i: int, x: wp.vec3d):
+    """Return the normal of what a vertex at x lies on [m]."""
+    n = contact.normal[i]
+    if contact.ball[i] > wp.float64(0.0):
+        n = wp.normalize(contact.centre[i] + n * contact.ball[i] - x)
+    return n
+
+
+@wp.func
+def gap_of(contact: Contact, i: int, x: wp.vec3d):
+    """Return how far off what it lies on a vertex at x is, negative within [m]."""
+    off = x - contact.centre[i]
+    n = contact.normal[i]
+    ball = contact.ball[i]
+    if ball > wp.float64(0.0):
+        return ball - wp.length(off - n * ball)
+    return wp.dot(off, n)
+
+
+@wp.func
 def push_of_plane(gap: wp.float64, skin: wp.float64, before: wp.float64):
     """Return the force of a plane on a vertex: that which it had at no gap [m], less the skin's for the gap; never a pull [N]."""
     return wp.max(before - skin * gap, wp.float64(0.0))
@@ -215,10 +239,10 @@ def gather_drape(
     e = motion.weight[i] * (x[1] - ground)
     if bending.stiffness[i] > zero:
         e += half * wp.dot(moment[i], moment[i]) / bending.stiffness[i]
-    n = contact.normal[i]
+    n = normal_of(contact, i, x)
     if wp.dot(n, n) > half:
         before = contact.pressed[i]
-        push = push_of_plane(wp.dot(x - contact.centre[i], n), contact.skin[i], before)
+        push = push_of_plane(gap_of(contact, i, x), contact.skin[i], before)
         e += half * (push * push - before * before) / contact.skin[i]
         rub = friction_force(x, n, contact.anchor[i], contact.grip[i], contact.most[i])
         e += wp.dot(contact.anchor[i] - x, rub) - half * wp.dot(rub, rub) / contact.grip[i]

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from .drape import TINY, Bending, Contact, Motion, friction_force, gather, push_of_plane
+from .drape import TINY, Bending, Contact, Motion, friction_force, gap_of, gather, normal_of, push_of_plane
 from .indices import natural
 
 wp.set_module_options({"enable_backward": False})
@@ -11,6 +11,24 @@ wp.set_module_options({"enable_backward": False})
 TOUCH = wp.constant(wp.float64(1.0e-6))
 # A depth falls enough from round to round if it falls to this share.
 FALLS = wp.constant(wp.float64(0.25))
+# The normals of a groove's two sides have a cosine below this one.
+TURNED = wp.constant(wp.float32(0.5))
+# What lies nearer to a ball's middle than this share of its radius pushes it off, in so many turns at most; in a sharper groove its middle
+# would be farther off than so many radii.
+HITS = wp.constant(wp.float32(0.9))
+TURNS = wp.constant(12)
+SHARPEST = wp.constant(wp.float32(2.0))
+
+
+@wp.func
+def normal_at(mesh: wp.uint64, body_normal: wp.array(dtype=wp.vec3), face: int, u: wp.float32, v: wp.float32):
+    """Return the interpolated unit normal at a place of a mesh; body_normal: at its vertices."""
+    indices = wp.mesh_get(mesh).indices
+    return wp.normalize(
+        u * body_normal[indices[3 * face]]
+        + v * body_normal[indices[3 * face + 1]]
+        + (1.0 - u - v) * body_normal[indices[3 * face + 2]]
+    )
 
 
 @wp.kernel
@@ -19,31 +37,54 @@ def find_planes(
     body_normal: wp.array(dtype=wp.vec3),
     position: wp.array(dtype=wp.vec3d),
     reach: wp.float32,
+    largest: wp.float32,
     first: int,
     # outputs
     centre: wp.array(dtype=wp.vec3d),
     normal: wp.array(dtype=wp.vec3d),
+    ball: wp.array(dtype=wp.float64),
 ):
     """Find the body's plane at each vertex: the nearest place of its surface and the interpolated normal there.
 
-    A sign is not asked for, as it is arbitrary at distance zero.
+    A sign is not asked for, as it is arbitrary at distance zero. A vertex that has come to the other side of a groove lies inside of a ball
+    from then on, which touches both sides, as in the body's morphological closing.
 
-    mesh: the body. body_normal: its normals at its vertices. position: #V [m]. reach: longest distance [m]. centre: #V [m].
-    normal: #V, zero where the body is out of reach.
+    mesh: the body. body_normal: its normals at its vertices. position: #V [m]. reach: longest distance [m]. largest: radius of a ball [m].
+    centre, normal, ball: those of `Contact`, #V, before and after; the normal is zero where the body is out of reach.
     """
     i = natural(wp.tid() + first)
     p = position[i]
     query = wp.mesh_query_point_no_sign(mesh, wp.vec3(wp.float32(p[0]), wp.float32(p[1]), wp.float32(p[2])), reach)
+    before = wp.vec3(wp.float32(normal[i][0]), wp.float32(normal[i][1]), wp.float32(normal[i][2]))
+    rolled = ball[i] > wp.float64(0.0)
     normal[i] = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+    ball[i] = wp.float64(0.0)
     if query.result:
-        face = 3 * query.face
-        indices = wp.mesh_get(mesh).indices
         place = wp.mesh_eval_position(mesh, query.face, query.u, query.v)
-        n = wp.normalize(
-            query.u * body_normal[indices[face]]
-            + query.v * body_normal[indices[face + 1]]
-            + (1.0 - query.u - query.v) * body_normal[indices[face + 2]]
-        )
+        n = normal_at(mesh, body_normal, query.face, query.u, query.v)
+        x = wp.vec3(wp.float32(p[0]), wp.float32(p[1]), wp.float32(p[2]))
+        turned = wp.dot(before, before) > 0.5 and wp.dot(before, n) < TURNED
+        if (rolled or turned) and wp.dot(x - place, n) < largest:
+            middle = place + n * largest
+            turn = int(0)
+            while turn < TURNS:
+                other = wp.mesh_query_point_no_sign(mesh, middle, HITS * largest)
+                if not other.result:
+                    break
+                away = middle - wp.mesh_eval_position(mesh, other.face, other.u, other.v)
+                side = normal_at(mesh, body_normal, other.face, other.u, other.v)
+                middle += side * (largest - wp.dot(away, side))
+                turn += 1
+            inwards = wp.normalize(middle - x)
+            if (
+                turn > 0
+                and turn < TURNS
+                and wp.length(middle - place) < SHARPEST * largest
+                and wp.dot(inwards, n) > 0.0
+            ):
+                place = middle - inwards * largest
+                n = inwards
+                ball[i] = wp.float64(largest)
         centre[i] = wp.vec3d(wp.float64(place[0]), wp.float64(place[1]), wp.float64(place[2]))
         normal[i] = wp.vec3d(wp.float64(n[0]), wp.float64(n[1]), wp.float64(n[2]))
 
@@ -66,9 +107,10 @@ def load_contact(
     i = natural(wp.tid() + first)
     f = gather(i, offset, entry, cell_force, bending, moment)
     f[1] = f[1] - motion.weight[i]
-    n = contact.normal[i]
+    x = motion.position[i]
+    n = normal_of(contact, i, x)
     push = wp.float64(0.0)
-    if wp.dot(n, n) > wp.float64(0.5) and wp.dot(motion.position[i] - contact.centre[i], n) < TOUCH:
+    if wp.dot(n, n) > wp.float64(0.5) and gap_of(contact, i, x) < TOUCH:
         push = wp.max(-wp.dot(f, n), push)
     contact.pressed[i] = push
     contact.rubbed[i] = -f
@@ -86,14 +128,14 @@ def carry_contact(motion: Motion, contact: Contact, stiffer: wp.float64, first: 
     """
     i = natural(wp.tid() + first)
     zero = wp.float64(0.0)
-    n = contact.normal[i]
+    x = motion.position[i]
+    n = normal_of(contact, i, x)
     before = contact.depth[i]
     contact.depth[i] = zero
     if wp.dot(n, n) < wp.float64(0.5):
         contact.pressed[i] = zero
         return
-    x = motion.position[i]
-    gap = wp.dot(x - contact.centre[i], n)
+    gap = gap_of(contact, i, x)
     push = push_of_plane(gap, contact.skin[i], contact.pressed[i])
     if push > zero:
         contact.depth[i] = wp.abs(gap)
@@ -112,7 +154,7 @@ def anchor_friction(motion: Motion, contact: Contact, first: int):
     motion: of which position counts. contact: pressed, most and anchor are set.
     """
     i = natural(wp.tid() + first)
-    n = contact.normal[i]
+    n = normal_of(contact, i, motion.position[i])
     if wp.dot(n, n) < wp.float64(0.5):
         contact.pressed[i] = wp.float64(0.0)
     most = contact.friction * contact.pressed[i]

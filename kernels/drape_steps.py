@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from .drape import TINY, Bending, Contact, Motion, gather
+from .drape import TINY, Bending, Contact, Motion, gap_of, gather, normal_of
 from .drape_contact import TOUCH
 from .indices import natural
 
@@ -64,9 +64,9 @@ def advance_drape(
     if halted[0] != 0:
         v = zero
     f = gather(i, offset, entry, force, bending, moment) - wp.vec3d(wp.float64(0.0), motion.weight[i], wp.float64(0.0))
-    n = contact.normal[i]
+    n = normal_of(contact, i, x)
     near = wp.dot(n, n) > wp.float64(0.5)
-    if near and wp.dot(x - contact.centre[i], n) < TOUCH:
+    if near and gap_of(contact, i, x) < TOUCH:
         push = -wp.dot(f, n)
         if push > wp.float64(0.0):
             pressing[i] = push
@@ -84,7 +84,8 @@ def advance_drape(
         v = v * (contact.longest_step / way)
     x = x + v
     if near:
-        depth = wp.dot(x - contact.centre[i], n)
+        depth = gap_of(contact, i, x)
+        n = normal_of(contact, i, x)
         if depth < wp.float64(0.0):
             x = x - n * depth
             v = v - n * wp.min(wp.dot(v, n), wp.float64(0.0))

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from .drape import TINY, Contact, Motion, draped_cell, mat32d, push_of_plane
+from .drape import TINY, Contact, Motion, draped_cell, gap_of, mat32d, normal_of, push_of_plane
 from .indices import natural
 from .membrane_cell import Cloth
 
@@ -87,12 +87,15 @@ def stiffen_contact(
     zero = wp.float64(0.0)
     unit = wp.identity(n=3, dtype=wp.float64)
     total = unit * least
-    n = contact.normal[i]
     x = motion.position[i]
+    n = normal_of(contact, i, x)
     if wp.dot(n, n) > wp.float64(0.5):
         beside = unit - wp.outer(n, n)
-        if push_of_plane(wp.dot(x - contact.centre[i], n), contact.skin[i], contact.pressed[i]) > zero:
+        push = push_of_plane(gap_of(contact, i, x), contact.skin[i], contact.pressed[i])
+        if push > zero:
             total += wp.outer(n, n) * contact.skin[i]
+            if contact.ball[i] > zero:
+                total += beside * (push / contact.ball[i])
         most = contact.most[i]
         if most > zero:
             off = beside * (x - contact.anchor[i])

@@ -38,13 +38,6 @@ def spring_law(d: wp.vec2d, rest_length: wp.float64, stiffness: wp.float64):
 
 
 @wp.func
-def spring_force(d: wp.vec2d, rest_length: wp.float64, stiffness: wp.float64):
-    """Return the force of `spring_law` alone [N]."""
-    _energy, _tension, force = spring_law(d, rest_length, stiffness)
-    return force
-
-
-@wp.func
 def sum_springs(i: int, position: wp.array(dtype=wp.vec2d), springs: Springs):
     """Return the energy and the sum of |tension| of the springs from vertex i to later vertices, and the force of all on it.
 

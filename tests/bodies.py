@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from warpflat.garment.mannequin.common_body import CommonBody, common_body_of_ma
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.stand_body import StandingBody, stand_body
 
-__all__ = ["body_of_size", "built_once", "laid_once", "stood"]
+__all__ = ["body_of_size", "built_once", "laid_once", "stood", "with_bent_elbows"]
 
 _from_size = Mannequin.from_size
 
@@ -46,3 +47,18 @@ def stood(vertices: np.ndarray, triangles: np.ndarray, **asked: Any) -> Standing
     if key not in _stood:
         _stood[key] = stand_body(vertices, triangles, **asked)
     return _stood[key]
+
+
+def with_bent_elbows(body: Mannequin) -> Mannequin:
+    """The body with its forearms turned forward by 35 degrees about the elbows, in a bow."""
+    layout, vertices = body.layout, body.vertices.copy()
+    for grid in layout.arms.values():
+        elbow, wrist = layout.arm_row["elbow"], layout.arm_row["wrist"]
+        joint = vertices[grid[elbow]].mean(axis=0)
+        share = np.clip((np.arange(len(grid)) - elbow + 2) / 4.0, 0.0, 1.0)
+        for row in range(elbow - 1, wrist + 1):
+            angle = np.radians(35.0) * share[row]
+            c, s = np.cos(angle), np.sin(angle)
+            turn = np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
+            vertices[grid[row]] = joint + (vertices[grid[row]] - joint) @ turn.T
+    return replace(body, vertices=vertices)

@@ -72,6 +72,10 @@ def test_the_scan_of_a_sewing_file_starts_in_its_folder(tube: Path, capsys: pyte
     table.write_text('[mannequin]\nscan = "gone.obj"\n')
     assert main(["drape", str(tube), "--seams", str(table)]) == 2
     assert str(tube.with_name("gone.obj")) in capsys.readouterr().err
+    # What it cannot ask for is refused.
+    table.write_text('[drape]\ncorrect_fabric = "denim"\n')
+    assert main(["drape", str(tube), "--seams", str(table), "--body", "EU 38"]) == 2
+    assert "drape.correct_fabric belongs to a scene" in " ".join(capsys.readouterr().err.split())
 
 
 def test_edges_are_listed(tube: Path, capsys: pytest.CaptureFixture[str]):
@@ -102,10 +106,10 @@ def test_a_pattern_from_a_file_is_corrected(tmp_path: Path, capsys: pytest.Captu
     table, out = tmp_path / "worn.toml", tmp_path / "out"
     table.write_text(
         'spacing_mm = 40\ntop = "hip"\n[mannequin]\nsize = "EU 38"\nresolution_mm = 40.0\n[drape]\ntolerance = 0.05\n'
-        "max_steps = 3000\n"
+        "max_steps = 3000\ncorrect = true\n"
     )
     command = ["drape", str(tmp_path / "narrow.json"), "--seams", str(table)]
-    assert main([*command, "--out", str(out), "--correct"]) == 0
+    assert main([*command, "--out", str(out)]) == 0
     printed = capsys.readouterr()
     assert "corrected in 1 round: " in printed.err
     assert "of the cloth was stretched beyond its limit, now" in printed.err

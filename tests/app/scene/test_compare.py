@@ -9,12 +9,15 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from bodies import body_of_size, with_bent_elbows
 from devices import DEVICE
 
 from warpflat.app.cli.main import main
 from warpflat.app.scene.compare import compare_fabrics, comparison_table, save_comparison
 from warpflat.app.scene.comparison import Comparison, outline
+from warpflat.app.scene.form_edits import edit_dart
 from warpflat.app.scene.load import Scene, load_scene
+from warpflat.app.scene.plan import plan_scene
 from warpflat.app.scene.run import run_scene
 from warpflat.core.errors import InputError
 
@@ -174,6 +177,32 @@ def test_all_else_is_what_a_run_makes_in_that_fabric(tmp_path: Path, text: str, 
             told = [{k: v for k, v in entry.items() if k != "price_j"} for entry in found.sewing[fabric][key]]
             assert told == [{k: v for k, v in entry.items() if k != "price_j"} for entry in metrics[key]]
     assert json.loads(json.dumps(found.as_dict()))["sewing"]["denim"]["seams"]
+
+
+def test_a_dart_that_only_woven_cloth_needs_is_in_each_of_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    bent = with_bent_elbows(body_of_size(40.0))
+    monkeypatch.setattr("warpflat.app.scene.form.scene_mannequin", lambda scene: bent)
+    plan = plan_scene(
+        scene_in(tmp_path, 'fabric = "woven"\n' + SKIRT.split("[[seams]]")[0].replace("a_line_skirt", "shirt"))
+    )
+    knit = replace(plan.scene, settings=plan.scene.settings.model_copy(update={"fabric": "jersey"}))
+    points = [[len(surface.vertices) for surface in each.surfaces] for each in (plan, plan.in_cloth(knit))]
+    assert "elbow dart left" in plan.form.pieces["sleeve_left"].darts
+    assert points[0] == points[1]
+
+
+def test_a_dart_that_a_run_leaves_out_is_not_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    scene = scene_in(tmp_path, 'form = "bodice"\nshape = "darts"\n[mannequin]\nsize = "EU 32"\nresolution_mm = 40\n')
+    for garment in (
+        compare_fabrics(scene, ["woven", "denim"]).results["woven"],
+        edit_dart(scene, "front.waist dart", how="turn", aim="nothing").before.parts,
+    ):
+        assert not any(line.startswith("waist dart") for line in garment["back"].surface.lines)
+        assert any(line.startswith("bust dart") for line in garment["front"].surface.lines)
+    assert main(["cuts", str(tmp_path / "front.toml"), "--out", str(tmp_path / "out")]) == 0
+    assert "back: the waist dart is left out" in capsys.readouterr().err
+    assert main(["cuts", str(tmp_path / "front.toml"), "--apply", "1", "--turn", "front.waist dart", "nothing"]) == 2
+    assert "--turn and --apply: give one edit at a time" in capsys.readouterr().err
 
 
 def test_what_a_run_refuses_is_not_compared(tmp_path: Path):

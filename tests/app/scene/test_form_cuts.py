@@ -138,6 +138,16 @@ def test_edits_are_other_tables():
         rotate_dart(darted, "front.dart", "bust")
 
 
+def test_what_comes_of_a_dart_of_one_side_stays_there():
+    alone = scene(cuts=[{**FRONT, "name": "waist", "mirrored": False}])
+    for edited in (
+        rotate_dart(alone, "front.waist", "bust"),
+        split_dart(alone, "front.waist", "bust"),
+        turn_dart(alone, "front.waist", "seam", None),
+    ):
+        assert not any(cut.mirrored for cut in edited.settings.cuts if not cut.omit)
+
+
 def test_a_seam_takes_over_the_darts_that_a_scene_asks_for():
     darted = scene(cuts=[{"piece": "front", "line": "bust"}, FRONT, {"piece": "back", "line": "princess back left"}])
     seam = {"name": "princess seam", "piece": "front", "line": "princess front left", "part": [0.0, 1.0]}

@@ -103,6 +103,15 @@ def test_zip_is_a_share_of_its_line_in_whole_centimetres(tmp_path: Path, garment
     assert 0.35 < lengths[0] < lengths[1] < 0.75
 
 
+def test_an_opening_suits_each_size(tmp_path: Path):
+    (tmp_path / "x.toml").write_text(
+        'form = "dress"\n[mannequin]\nsize = "EU 38"\nresolution_mm = 40\n[[openings]]\nkind = "zip"\nseam = "centre back"\n'
+        'length_share = 0.5\n[pattern]\nsizes = ["EU 140"]\n'
+    )
+    plan = plan_garment(load_scene(tmp_path / "x.toml"))
+    assert plan.other_sizes()["EU 140"].openings[0].length_mm < plan.openings[0].length_mm
+
+
 def test_length_share_before_start_is_named(tmp_path: Path):
     scene_of(tmp_path, "leotard", CHILD)
     text = (tmp_path / "x.toml").read_text().replace("length_share = 0.75", "length_share = 0.1\nstart_mm = 200")

@@ -5,10 +5,12 @@ import os
 import re
 import runpy
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from warpflat.app.scene import run
 from warpflat.app.scene.frames import FrameSchedule
 from warpflat.app.scene.load import fabric_of_correction, load_scene, scene_fabric
 from warpflat.app.scene.plan import plan_scene
@@ -300,3 +302,34 @@ def test_the_kernels_driven_by_hand_come_to_rest(capsys: pytest.CaptureFixture[s
     assert free < developed
     assert wide[2] < wide[1], "one's own force makes it narrower"
     assert "NOT at rest" not in told
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "datum = 'centre'\n[seams]\nfind = 'none'\nkeep = ['waist']\n[surface]\nfile = 'x.obj'\n",
+            "datum belongs to one piece",
+        ),
+        ("start = 'x.obj'\nform = 'bodice'\n[mannequin]\nsize = 'EU 38'\n", "start belongs to a [surface]"),
+    ],
+)
+def test_what_a_scene_would_not_heed_is_refused(tmp_path: Path, text: str, message: str):
+    with pytest.raises(InputError, match=re.escape(message)):
+        load_scene(write_scene(tmp_path, text))
+
+
+def test_a_table_for_a_piece_of_a_garment_that_is_cut_where_it_is_kept(tmp_path: Path):
+    kept = "[seams]\nfind = 'none'\nkeep = ['waist']\n[surface]\nfile = 'x.obj'\n[pieces.front]\ngrain_angle = 5\n"
+    assert load_scene(write_scene(tmp_path, kept)).settings.pieces["front"].grain_angle == 5
+
+
+def test_sizes_lie_in_the_order_of_their_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    asked = list[str]()
+    monkeypatch.setattr(run, "garment_files", lambda sizes, *_, **__: asked.extend(sizes))
+    settings = SimpleNamespace(pattern=SimpleNamespace(sizes=["US 2", "US 00"]))
+    plan = SimpleNamespace(
+        scene=SimpleNamespace(settings=settings, name="trial"), found=None, mannequin=None, drawing=None, size="US 0"
+    )
+    run._draft(plan, dict.fromkeys(("US 2", "US 00", "US 0")), tmp_path)
+    assert asked == ["US 00", "US 0", "US 2"]

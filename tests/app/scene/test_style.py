@@ -56,6 +56,13 @@ def test_neckline_ease_flare_and_closure():
     assert tables_of("tshirt", neck_depth="9")["form"]["neckline"]["side_cm"] == 2
 
 
+def test_edits_do_not_hang_on_their_order():
+    edits = {"flare": "20", "sleeve_width": "9", "closure": "zip-side", "length": "hip"}
+    for garment, kinds in (("shift_dress", ("flare", "closure", "length")), ("sweatshirt", ("sleeve_width", "length"))):
+        asked = {key: edits[key] for key in kinds}
+        assert tables_of(garment, **asked) == tables_of(garment, **dict(reversed(asked.items())))
+
+
 def test_hem_lies_higher_at_its_lines():
     tables = tables_of("a_line_skirt", hem_side_left="20", hem_centre_front="5")
     rises = {"side left": 200, "side right": 0, "centre front": 50, "centre back": 0}

@@ -27,6 +27,16 @@ def handles_of(solution: Solution) -> dict[str, Handle]:
     return {f"{each.piece}: {each.name}": each for each in pattern_handles(solution)}
 
 
+def test_a_mouth_that_is_dragged_leaves_the_tip_drawn_back(tmp_path: Path) -> None:
+    cut = {"name": "dart", "line": "centre", "part": [0.0, 0.4], "tip_back": 0.01}
+    mesh = {"surface": {"shape": "bodice", "resolution": 17}, "datum": "centre", "cuts": [cut]}
+    handles = handles_of(solve(scene_of(tmp_path, mesh)))
+    mouth = next(handle for name, handle in handles.items() if "mouth of dart" in name)
+    (changed,) = mouth.change(mouth.place + np.array([0.01, 0.0]))["cuts"]
+    assert changed["tip_back"] == 0.01
+    assert changed.keys() == {"name", "tip_back", "from", "to"}
+
+
 @pytest.fixture(scope="module")
 def dress(tmp_path_factory: pytest.TempPathFactory) -> Solution:
     return solve(scene_of(tmp_path_factory.mktemp("dress"), {**BODY, "form": "dress", "shape": "darts"}))

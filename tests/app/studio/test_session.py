@@ -14,12 +14,13 @@ import pytest
 
 from warpflat.app.cli.studio import scene_of_mesh
 from warpflat.app.scene.as_toml import document_as_toml
+from warpflat.app.scene.form import scene_form
 from warpflat.app.scene.load import load_scene, make_scene
 from warpflat.app.scene.plan import plan_mesh
 from warpflat.app.studio.cut_tables import cut_along, cut_between, cuttable_lines
 from warpflat.app.studio.frame import PieceFrame, Watch
 from warpflat.app.studio.maps import face_values, piece_scale, vertex_values
-from warpflat.app.studio.panel import preview_words
+from warpflat.app.studio.panel import _head, preview_words
 from warpflat.app.studio.pick import Hit, nearest_line, pick_flat, pick_on_rays
 from warpflat.app.studio.save import free_name
 from warpflat.app.studio.session import Session
@@ -198,6 +199,33 @@ def test_a_form_takes_a_body_a_form_and_cuts_along_its_lines(tmp_path: Path) -> 
     session.change_form("bodice")
     assert session.note == "left out, since they belong to the form before: cuts"
     assert session.scene.settings.cuts == []
+
+
+def test_another_form_has_no_pockets_and_no_pieces_of_the_one_before(tmp_path: Path) -> None:
+    data = {"form": "basic_block", "mannequin": {"size": "EU 38", "resolution_mm": 40}}
+    pockets = [{"kind": "patch", "piece": "front_skirt"}]
+    pattern = {"names": {"front_bodice": "Vorderteil"}, "allowances_mm": {"front_bodice.neck": 7}, "paper": "A0"}
+    scene = make_scene({**data, "pockets": pockets, "pattern": pattern}, name="trial", folder=tmp_path, where="trial")
+    worker = AtOnce()
+    worker.idle = True
+    session = Session(scene, worker)
+    session.change_form("tshirt")
+    assert session.note.endswith(": pockets, pattern.names, pattern.allowances_mm")
+    assert session.scene.settings.pattern.given() == {"paper": "A0"}
+    assert session.scene.settings.pockets == []
+
+
+def test_a_form_follows_its_cloth_and_what_was_left_out_is_shown(tmp_path: Path) -> None:
+    data = {"form": "bodice", "shape": "darts", "mannequin": {"size": "EU 32", "resolution_mm": 40}, "fabric": "woven"}
+    session = Session(make_scene(data, name="trial", folder=tmp_path, where="trial"), AtOnce())
+    session.begin()
+    assert "back: the waist dart is left out" in _head(session)
+    before = session.solution
+    assert before is not None
+    session.change("cloth", fabric="jersey", pulled_on=True)
+    assert session.solution is not None
+    assert session.solution.plan.form.recipe == scene_form(session.solution.plan.scene)[1].recipe  # type: ignore[union-attr]
+    assert session.solution.plan.form is not before.plan.form  # type: ignore[union-attr]
 
 
 def test_saving_writes_a_new_scene_and_runs_it_from_scratch(tmp_path: Path) -> None:

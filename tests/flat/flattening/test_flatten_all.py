@@ -234,6 +234,20 @@ def test_a_joined_network_is_listed_as_that_of_the_joined_surface():
     np.testing.assert_array_equal(joined.cell_arrays.faces.ravel()[around.entry], vertex)
 
 
+def test_a_joined_network_holds_those_quads_that_its_parts_hold():
+    """Long ones lack shear and are held against waves; squares are not."""
+    squares, long = (
+        SpringNetwork.build(surface, CLOTH, surface.vertices[:, :2], device=DEVICE, model="springs")
+        for surface in (shape("dome", 9), shape("strip", 5))
+    )
+    joined, alone = join_networks([squares, long]).spring_arrays, join_networks([squares, squares]).spring_arrays
+    for name in ("hourglass", "shear_deficit"):
+        assert getattr(alone, name) is None
+        held, of_long = getattr(joined, name), getattr(long.spring_arrays, name)
+        np.testing.assert_array_equal(held[squares.face_count :], of_long)
+        assert not held[: squares.face_count].any()
+
+
 @pytest.mark.parametrize("stretched", [False, True])
 @pytest.mark.parametrize("models", ["springs", "membrane", "both"])
 def test_a_joined_network_has_the_energies_and_forces_of_its_parts(models: str, stretched: bool):

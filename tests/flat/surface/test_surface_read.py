@@ -12,6 +12,7 @@ from warpflat.app.cli.main import main
 from warpflat.core.errors import InputError
 from warpflat.flat.surface.connectivity import chain_lines
 from warpflat.flat.surface.io.read import METRES_PER_UNIT, read_scan, read_surface
+from warpflat.flat.surface.io.read_pieces import read_pieces
 from warpflat.flat.surface.triangles import triangulate
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
@@ -408,6 +409,8 @@ def test_one_of_several_mesh_prims_is_chosen_by_path_or_name(tmp_path):
     assert "holds 3 mesh prims" in message
     assert "/World/front/surface" in message
     assert read_surface(tmp_path / "a.usda", prim="/World/back/surface").name == "surface"
+    assert len(read_pieces(tmp_path / "a.usda")) > 1
+    assert len(read_pieces(tmp_path / "a.usda", prim="/World/back/surface")) == 1
     # A scan is all of them: an avatar's skin, eyes and hair.
     vertices_of_all, faces = read_scan(tmp_path / "a.usda")
     assert (len(vertices_of_all), len(faces)) == (3 * len(vertices), 3 * len(quads))

@@ -1,10 +1,13 @@
 """Garments of woven cloth whose borders are drawn as by hand, and whose girths have the ease that was asked for."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from bodies import body_of_size
 
 from warpflat.core.polyline import turning_angles
+from warpflat.garment.construction.drawn_curves import _open_edges
 from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.garment import Garment
 
@@ -56,3 +59,10 @@ def test_levels_do_not_wave_to_be_as_long_as_asked(dress: Garment):
             places = dress.pieces[name].positions[line]
             turns = np.degrees(turning_angles(places[np.argsort(places[:, 0])]))
             assert np.abs(np.diff(turns)).max() < 15.0, (name, level)
+
+
+def test_an_edge_is_drawn_in_parts_that_meet_at_its_corners():
+    bent = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [3.0, 1.0], [3.0, 2.0]])
+    piece = SimpleNamespace(darts={}, fold=None, edges={"side": np.arange(6)})
+    parts = list(_open_edges(SimpleNamespace(pieces={"front": piece}), "front", bent))  # type: ignore[arg-type]
+    assert [(edge, vertices.tolist()) for edge, vertices in parts] == [("side", [0, 1, 2, 3]), ("side", [3, 4, 5])]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bodies import body_of_size
+from bodies import body_of_size, with_bent_elbows
 
 from warpflat.core.polyline import polyline_length, segment_lengths
 from warpflat.flat.flattening.flatten_piece import flatten
@@ -25,18 +25,7 @@ def body() -> Mannequin:
 
 @pytest.fixture(scope="module")
 def bent(body: Mannequin) -> Mannequin:
-    """The body with its forearms turned forward by 35 degrees about the elbows, in a bow."""
-    layout, vertices = body.layout, body.vertices.copy()
-    for grid in layout.arms.values():
-        elbow, wrist = layout.arm_row["elbow"], layout.arm_row["wrist"]
-        joint = vertices[grid[elbow]].mean(axis=0)
-        share = np.clip((np.arange(len(grid)) - elbow + 2) / 4.0, 0.0, 1.0)
-        for row in range(elbow - 1, wrist + 1):
-            angle = np.radians(35.0) * share[row]
-            c, s = np.cos(angle), np.sin(angle)
-            turn = np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
-            vertices[grid[row]] = joint + (vertices[grid[row]] - joint) @ turn.T
-    return replace(body, vertices=vertices)
+    return with_bent_elbows(body)
 
 
 def _sleeve(body: Mannequin, name: str = "shirt", *, woven: bool = True) -> tuple[FormResult, Garment]:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import warp as wp
 from cloths import cloth_of, cylinder_body, cylinder_cloth, grid, sheet
 from scipy.integrate import solve_bvp
+from warpflat.kernels.drape_contact import find_planes
 
+from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.relax_drape import DrapedCloth, relax_drape
 from warpflat.garment.draping.sewn_cloth import SewnCloth
@@ -116,3 +119,23 @@ def test_a_drape_is_repeated_bit_for_bit(monkeypatch: pytest.MonkeyPatch):
     np.testing.assert_array_equal(results[0].positions, results[1].positions)
     assert results[0].steps == results[1].steps == 200
     assert not results[0].converged
+
+
+def test_what_passes_to_the_other_side_of_a_groove_lies_in_a_ball_between_both():
+    wall, radius = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.2], [0.1, 0.1, 0.2], [0.1, 0.1, 0.0]]), 0.02
+    faces = np.array([[0, 1, 2, 3], [7, 6, 5, 4]], dtype=np.int32)
+    groove = Body(np.concatenate([wall, wall * [-1.0, 1.0, 1.0]]), faces, device=wp.get_device("cpu"))
+    centre, normal = (wp.zeros(2, wp.vec3d, device="cpu") for _ in range(2))
+    ball, found = wp.zeros(2, wp.float64, device="cpu"), []
+    # The first one passes over, the second one does not.
+    for x in (0.008, -0.008):
+        at = wp.array([[x, 0.007, 0.1], [0.05, 0.049, 0.1]], dtype=wp.vec3d, device="cpu")
+        inputs = [wp.uint64(groove.mesh.id), groove.normals, at, 0.1, radius, 0]
+        wp.launch(find_planes, dim=2, inputs=inputs, outputs=[centre, normal, ball], device="cpu")
+        found.append((ball.numpy().tolist(), normal.numpy().copy()))
+    half = np.sqrt(0.5)
+    assert [each for each, _ in found] == [[0.0, 0.0], [pytest.approx(radius), 0.0]]
+    np.testing.assert_allclose(found[0][1], [[-half, half, 0.0]] * 2, atol=1e-6)
+    np.testing.assert_allclose(found[1][1][1], [-half, half, 0.0], atol=1e-6)
+    middle = centre.numpy()[0] + radius * normal.numpy()[0]
+    np.testing.assert_allclose(middle, [0.0, radius / half, 0.1], atol=1e-5)

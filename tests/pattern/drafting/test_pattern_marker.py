@@ -44,6 +44,13 @@ def test_the_grain_lies_along_the_cloth_and_the_nap_one_way(marker):
         assert (along[0] < 0) == copy.turned
 
 
+@pytest.mark.parametrize("gap", [-0.001, 0.14, 0.2])
+def test_a_gap_is_small_against_the_cloth(gap):
+    assert Cloth(width=1.4, gap=0.139).gap == 0.139
+    with pytest.raises(InputError, match=r"gap .* between pieces; it must be 0 or more, and small"):
+        Cloth(width=1.4, gap=gap)
+
+
 def test_pairs_are_mirrored_and_nothing_is_scaled(marker):
     plan, _ = marker
     for name in ("back bodice", "sleeve", "skirt back"):

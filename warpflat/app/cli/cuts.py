@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -74,6 +75,8 @@ def cuts(
         (how, (dart, aim)), *more = edits
         if more:
             raise InputError(f"--{how} and --{more[0][0]}: give one edit at a time")
+        if apply is not None:
+            raise InputError(f"--{how} and --apply: give one edit at a time")
         if how == "turn" and at is not None:
             raise InputError("--at belongs to --rotate and --split")
         if loaded.settings.mannequin is None:
@@ -92,6 +95,7 @@ def cuts(
     from warpflat.app.cli.progress_bar import ProgressBar
     from warpflat.app.cli.tables import ledger_table
     from warpflat.app.scene.as_toml import tables_as_toml
+    from warpflat.app.scene.form_shaping import sewn_form
     from warpflat.app.scene.ledger import cuts_of_entry, scene_ledger, with_cut
     from warpflat.app.scene.run import files_of_run, run_scene
     from warpflat.core import expect_files, optional_file, output_folder, write_report
@@ -103,7 +107,11 @@ def cuts(
         ProgressBar(loaded.name, hidden=not output.tells) as bar,
         output_folder(target, expected, sources=loaded.sources, guard=True) as folder,
     ):
+        closed: tuple[str, ...] = ()
+        if loaded.settings.mannequin is not None and loaded.settings.shape == "darts":
+            loaded, _, closed = sewn_form(loaded, device=output.device)
         ledger = scene_ledger(loaded, by=by, device=output.device)
+        ledger = replace(ledger, notes=(*closed, *ledger.notes))
         chosen = None if apply is None else ledger.entry(apply)
         with optional_file(folder / "ledger.png", written) as path:
             write_ledger_picture(path, ledger)

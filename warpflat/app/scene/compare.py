@@ -9,7 +9,7 @@ from typing import Any
 
 from warpflat.app.scene.comparison import Comparison
 from warpflat.app.scene.drape import drape_scene
-from warpflat.app.scene.form_shaping import settle_shape
+from warpflat.app.scene.form_shaping import require_open_darts, settle_shape, with_open_darts
 from warpflat.app.scene.load import Scene, scene_fabric
 from warpflat.app.scene.plan import plan_scene
 from warpflat.core import InputError, aligned, laid_upon
@@ -46,22 +46,26 @@ def compare_fabrics(
         )
     # In the scene's own fabric, so that all patterns have the same darts.
     scene, _ = settle_shape(scene, device=device)
-    dressed, known = {}, dict[str, str]()
+    called, known = dict[str, str](), dict[str, str]()
     for name in fabrics:
-        one = replace(scene, settings=scene.settings.model_copy(update={"fabric": name}))
-        fabric = scene_fabric(one)
+        fabric = scene_fabric(_in_fabric(scene, name))
         if fabric.name in known:
             raise InputError(f"fabric {name!r} is given twice ({known[fabric.name]}); compare different ones")
         known.update(dict.fromkeys((fabric.name, *fabric.aliases), fabric.name))
-        dressed[fabric.name] = one
-    plan = plan_scene(scene, device=device)
-    garments: dict[str, Garment] = {}
-    for name, one in dressed.items():
+        called[fabric.name] = name
 
-        def report(_: str, progress: Progress, fabric: str = name) -> bool | None:
-            return None if on_progress is None else on_progress(fabric, progress)
+    def in_each(one: Scene) -> dict[str, Garment]:
+        plan, made = plan_scene(one, device=device), dict[str, Garment]()
+        for fabric, name in called.items():
 
-        garments[name] = plan.in_cloth(one).flatten(callback=report)
+            def report(_: str, progress: Progress, fabric: str = fabric) -> bool | None:
+                return None if on_progress is None else on_progress(fabric, progress)
+
+            made[fabric] = plan.in_cloth(_in_fabric(one, name)).flatten(callback=report)
+        require_open_darts(one, made.values())
+        return made
+
+    scene, garments, _ = with_open_darts(scene, in_each)
     results = {name: {part: advise(flat) for part, flat in garment.parts.items()} for name, garment in garments.items()}
     first = next(iter(results.values()))
     layouts = {
@@ -69,8 +73,14 @@ def compare_fabrics(
         for name, pieces in results.items()
     }
     sewing = {name: garment.sewing_metrics() for name, garment in garments.items()}
-    drapes = {name: drape_scene(dressed[name], garments[name], device=device) for name in garments if drape}
+    drapes = {
+        name: drape_scene(_in_fabric(scene, called[name]), garments[name], device=device) for name in garments if drape
+    }
     return Comparison(name=scene.name, results=results, layouts=layouts, sewing=sewing, drapes=drapes)
+
+
+def _in_fabric(scene: Scene, name: str) -> Scene:
+    return replace(scene, settings=scene.settings.model_copy(update={"fabric": name}))
 
 
 def compared_files(*, drape: bool) -> list[str]:

@@ -12,9 +12,8 @@ from typing import Any
 from warpflat.app.scene.as_toml import tables_as_toml
 from warpflat.app.scene.cuts import asked_cuts, cut_of_dart, cuts_beside, omitted, place_of, scene_with
 from warpflat.app.scene.form import scene_form, scene_recipe
-from warpflat.app.scene.form_shaping import settle_shape
+from warpflat.app.scene.form_shaping import settle_shape, sewn_form
 from warpflat.app.scene.load import Scene
-from warpflat.app.scene.plan import plan_garment
 from warpflat.core import InputError, nearest, polyline_length
 from warpflat.garment import FormDart, FormGarment, plan_form
 
@@ -86,12 +85,13 @@ def edit_dart(
         InputError: the scene has no such dart, or the edit cannot be made.
     """
     scene, _ = settle_shape(scene, device=device)
-    before = plan_garment(scene, device=device).flatten()
+    scene, before, _ = sewn_form(scene, device=device)
     if how == "turn":
         edited = turn_dart(scene, dart, aim, before)
     else:
         edited = (rotate_dart if how == "rotate" else split_dart)(scene, dart, aim, at=at)
-    return DartEdit(before=before, after=plan_garment(edited, device=device).flatten(), scene=edited)
+    edited, after, _ = sewn_form(edited, device=device)
+    return DartEdit(before=before, after=after, scene=edited)
 
 
 def rotate_dart(scene: Scene, dart: str, line: str, *, at: str | None = None) -> Scene:
@@ -102,7 +102,13 @@ def rotate_dart(scene: Scene, dart: str, line: str, *, at: str | None = None) ->
     """
     old = _find(scene, dart)
     words = line.removesuffix(" left").removesuffix(" right")
-    cut = {"name": f"{words} dart", "piece": old.piece, "line": line, **({} if at is None else {"at": at})}
+    cut = {
+        "name": f"{words} dart",
+        "piece": old.piece,
+        "line": line,
+        **({} if at is None else {"at": at}),
+        **_sides(old),
+    }
     return scene_with(scene, cuts=[*_cuts_without(scene, old), cut])
 
 
@@ -117,7 +123,7 @@ def split_dart(scene: Scene, dart: str, line: str, *, at: str | None = None) -> 
     old = _find(scene, dart)
     half = None if old.mouth_mm is None else 0.5 * old.mouth_mm
     first = cut_of_dart(replace(old, mouth_mm=half))
-    second: dict[str, Any] = {"name": f"second {old.name}", "piece": old.piece}
+    second: dict[str, Any] = {"name": f"second {old.name}", "piece": old.piece, **_sides(old)}
     if at is None:
         own = scene_form(scene)[1].pieces.get(old.piece)
         # Whether the line is an edge of the piece, or a part of one.
@@ -155,7 +161,7 @@ def turn_dart(scene: Scene, dart: str, into: str, garment: FormGarment) -> Scene
     if into == "seam":
         # The book's dart there goes with the piece.
         kept = [cut for cut in cuts if not (cut.get("omit") and place_of(cut) == old.place)]
-        seam = {"name": f"{old.name} seam", "piece": old.piece, "line": old.line, "part": [0.0, 1.0]}
+        seam = {"name": f"{old.name} seam", "piece": old.piece, "line": old.line, "part": [0.0, 1.0], **_sides(old)}
         return scene_with(scene, cuts=[*cuts_beside(*scene_recipe(scene), kept, seam), seam])
     form = garment.form
     fisheyes = {f"{name}.{own}" for name, piece in form.pieces.items() for own in piece.fisheyes}
@@ -177,6 +183,11 @@ def turn_dart(scene: Scene, dart: str, into: str, garment: FormGarment) -> Scene
             raise InputError(f"dart {dart!r}: seam {name!r} has fullness or gathers in the scene already")
         seams.append({"name": name, **how, "longer": longer})
     return scene_with(scene, cuts=cuts, seams=seams)
+
+
+def _sides(dart: FormDart) -> dict[str, Any]:
+    """Return the key that keeps what comes of a dart of one side on that side."""
+    return {} if dart.mirrored else {"mirrored": False}
 
 
 def _find(scene: Scene, dart: str) -> FormDart:

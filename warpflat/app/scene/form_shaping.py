@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from typing import TypeVar
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from warpflat.app.scene.cuts import asked_cuts, omitted, place_of, scene_with
 from warpflat.app.scene.form import scene_recipe
 from warpflat.app.scene.ledger import candidate_cuts, trial_of_scene, try_cuts, with_cut
 from warpflat.app.scene.load import Scene
+from warpflat.app.scene.plan import plan_garment
 from warpflat.flat import Flattening, LedgerEntry, RankedBy
 from warpflat.garment import (
     ELBOW,
@@ -24,7 +26,16 @@ from warpflat.garment import (
     usual_darts,
 )
 
-__all__ = ["ClosedDarts", "require_open_darts", "settle_shape", "without_closed_darts"]
+__all__ = [
+    "ClosedDarts",
+    "require_open_darts",
+    "settle_shape",
+    "sewn_form",
+    "with_open_darts",
+    "without_closed_darts",
+]
+
+Made = TypeVar("Made")
 
 
 def settle_shape(scene: Scene, *, device: str | None = None) -> tuple[Scene, tuple[str, ...]]:
@@ -177,6 +188,36 @@ def without_closed_darts(scene: Scene, garments: Iterable[FormGarment]) -> tuple
             why = "is left out, since it would come within 30 mm of the armhole; [[cuts]] keeps it or gives another one"
         notes.append(f"{dart.piece}: the {dart.name} {why}")
     return scene_with(scene, cuts=cuts), tuple(notes)
+
+
+def with_open_darts(scene: Scene, make: Callable[[Scene], Made]) -> tuple[Scene, Made, tuple[str, ...]]:
+    """Return a scene without the darts that cannot be sewn, what is made of it, and one sentence for each of these darts.
+
+    Args:
+        scene: with its shape settled.
+        make: makes it of a scene; raises `ClosedDarts` if it is to be made without some.
+    """
+    notes: tuple[str, ...] = ()
+    while True:
+        try:
+            return scene, make(scene), notes
+        except ClosedDarts as closed:
+            scene, notes = closed.without, (*notes, *closed.notes)
+
+
+def sewn_form(scene: Scene, *, device: str | None = None) -> tuple[Scene, FormGarment, tuple[str, ...]]:
+    """Return a scene without the darts that cannot be sewn, its garment, flattened and sewn, and one sentence for each of these darts.
+
+    Raises:
+        InputError: as :func:`warpflat.app.scene.plan.plan_garment`.
+    """
+
+    def sewn(one: Scene) -> FormGarment:
+        garment = plan_garment(one, device=device).flatten()
+        require_open_darts(one, [garment])
+        return garment
+
+    return with_open_darts(scene, sewn)
 
 
 def require_open_darts(scene: Scene, garments: Iterable[Garment]) -> None:

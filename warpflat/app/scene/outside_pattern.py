@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, model_validator
 
 from warpflat.app.scene.load import errors_named, expand_variables
 from warpflat.app.scene.run import SceneResult
@@ -61,6 +61,12 @@ class SewingTable(Table):
     mannequin: MannequinTable | None = None
     spacing_mm: Annotated[float, Field(ge=2, le=50)] = 10.0
     drape: DrapeTable = Field(default_factory=DrapeTable)
+
+    @model_validator(mode="after")
+    def _of_a_pattern(self) -> SewingTable:
+        if self.drape.correct_fabric is not None:
+            raise ValueError("drape.correct_fabric belongs to a scene, whose designed surface is kept; leave it out")
+        return self
 
 
 class RunGirth(BaseModel):
@@ -383,7 +389,7 @@ def drape_outside(
     table, pattern = job.sewing.drape, job.pattern
     cloth, notes = _fabric(job, fabric)
     cloth = cloth.allowing(shear_limit)
-    usd = usd or table.usd
+    usd, correct = usd or table.usd, correct or table.correct
     names = ["metrics.json", "drape.png", "drape.webp", "frames.usdc", *(["worn.usdc"] if usd else [])]
     if correct:
         names += ["corrected.png", f"{job.name}.corrected.dxf", f"{job.name}.corrected.svg"]

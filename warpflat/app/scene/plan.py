@@ -334,8 +334,9 @@ class GarmentPlan(Plan):
         )
 
     def in_cloth(self, scene: Scene) -> GarmentPlan:
-        """See :meth:`Plan.in_cloth`."""
-        return plan_garment(scene, device=self.device)
+        """See :meth:`Plan.in_cloth`; a form that is pulled on grows by its cloth, any other stays, with darts for woven cloth, too."""
+        built = None if scene.settings.pulled_on else (self.mannequin, self.form)
+        return plan_garment(scene, device=self.device, built=built)
 
     @cached_property
     def bricks(self) -> dict[str, list[str]]:
@@ -385,7 +386,7 @@ class GarmentPlan(Plan):
             if size != self.size:
                 with errors_named(f"{self.scene.where}: pattern.sizes"):
                     body, form = scene_form(self.scene, scene_mannequin(self.scene, size=size))
-                found[size] = replace(self, mannequin=body, form=form)
+                found[size] = replace(self, mannequin=body, form=form, openings=_sized_openings(self.scene, form))
         return found
 
 
@@ -530,6 +531,18 @@ def flatten_options(scene: Scene, device: str | None = None) -> dict[str, Any]:
     }
 
 
+def _sized_openings(scene: Scene, form: FormResult) -> list[OpeningTable]:
+    """Return the openings of a scene, each as long as it is on a form, which is the one of a size."""
+    on_form, found = {name: piece.surface.vertices for name, piece in form.pieces.items()}, list[OpeningTable]()
+    for number, opening in enumerate(scene.settings.openings):
+        if scene.settings.cloth is not None and scene.settings.cloth.lining:
+            # A lining is sewn to the inner edges of the facings of button stands.
+            opening = opening.model_copy(update={"facing": opening.facing or "separate"})
+        with errors_named(f"{scene.where}: openings[{number}]"):
+            found.append(sized_opening(form, opening, on_form))
+    return found
+
+
 def plan_garment(
     scene: Scene, *, device: str | None = None, built: tuple[Mannequin, FormResult] | None = None
 ) -> GarmentPlan:
@@ -548,18 +561,11 @@ def plan_garment(
     mannequin, form = built or scene_form(scene)
     with errors_named(f"{scene.where}: pattern"):
         drawing = pattern_options(settings.pattern, settings.marker, settings.cloth)
-        openings = list(settings.openings)
-        if settings.cloth is not None and settings.cloth.lining:
-            # A lining is sewn to the inner edges of the facings of button stands.
-            openings = [each.model_copy(update={"facing": each.facing or "separate"}) for each in openings]
+        openings = _sized_openings(scene, form)
         if settings.half:
             drawing = replace(drawing, rules=sewn_centres(drawing.rules, openings))
         plan = plan_form(form, drawing.rules)
         check_names(drawing.names, form.pieces)
-    for number, opening in enumerate(openings):
-        with errors_named(f"{scene.where}: openings[{number}]"):
-            on_form = {name: piece.surface.vertices for name, piece in form.pieces.items()}
-            openings[number] = sized_opening(form, opening, on_form)
     with errors_named(f"{scene.where}: grain_angle"):
         check_fold_grain(find_fold_lines(form, plan), settings.grain_angle)
     wishes = scene_wishes(settings.seams)

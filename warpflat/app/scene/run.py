@@ -14,7 +14,7 @@ import numpy as np
 from warpflat.app.review.page import pack_frames, pack_pictures, write_review
 from warpflat.app.scene.cuts import CutSequence
 from warpflat.app.scene.drape import drape_names, write_drape
-from warpflat.app.scene.form_shaping import ClosedDarts, require_open_darts, settle_shape
+from warpflat.app.scene.form_shaping import require_open_darts, settle_shape, with_open_darts
 from warpflat.app.scene.frames import MANNEQUIN, Film
 from warpflat.app.scene.load import Scene
 from warpflat.app.scene.plan import Plan, plan_scene
@@ -37,6 +37,7 @@ from warpflat.garment import (
     Garment,
     Mannequin,
     garment_files,
+    size_names,
 )
 from warpflat.pattern import WrittenPattern, note_on_names, pattern_names
 
@@ -97,15 +98,14 @@ def run_scene(
     sources = (*scene.sources, *(() if cuts is None else cuts.surface.sources))
     with output_folder(out, files_of_run(scene), sources=sources, guard=True) as folder:
         settled, notes = settle_shape(scene, device=device)
-        form = built() if built is not None and settled is scene else None
-        while True:
-            try:
-                plan = plan_scene(settled, device=device, cuts=cuts, built=form)
-                result = _run(plan, folder, on_progress=on_progress, device=device)
-            except ClosedDarts as closed:
-                settled, form, notes = closed.without, None, (*notes, *closed.notes)
-            else:
-                return replace(result, notes=(*notes, *result.notes))
+
+        def made(one: Scene) -> SceneResult:
+            form = built() if built is not None and one is scene else None
+            plan = plan_scene(one, device=device, cuts=cuts, built=form)
+            return _run(plan, folder, on_progress=on_progress, device=device)
+
+        _, result, closed = with_open_darts(settled, made)
+        return replace(result, notes=(*notes, *closed, *result.notes))
 
 
 def files_of_run(scene: Scene) -> list[str]:
@@ -281,8 +281,9 @@ def _draft(plan: Plan, sizes: Mapping[str, Garment], folder: Path) -> WrittenPat
     scene, wanted = plan.scene, plan.scene.settings.pattern.sizes
     if set(sizes) == set(wanted):
         order = list(dict.fromkeys(wanted))
-    else:  # by their numbers where the scene leaves out the mannequin's own
-        order = sorted(sizes, key=lambda size: (int("".join(filter(str.isdigit, size)) or 0), size))
+    else:  # as the tables have them where the scene leaves out the mannequin's own
+        names = size_names()
+        order = sorted(sizes, key=lambda size: (names.index(size) if size in names else len(names), size))
     garments = {size: sizes[size] for size in order}
     found = () if plan.found is None else plan.found.seams
     pattern = garment_files(

@@ -485,6 +485,7 @@ _OF_SURFACE = {
         for key, table in (("find_seams", "[seams]"), ("seams_cut", "[[seams_cut]]"))
     },
     "pieces": "pieces is for pieces from a file; on a form give [[cuts]] with their piece",
+    "start": "start belongs to a [surface], whose mesh has one layout; a form's pieces start from their own",
     **dict.fromkeys(("lines", "datum"), "lines and datum belong to a [surface]; a form's pieces have their own"),
 }
 
@@ -619,8 +620,10 @@ class SceneTable(Table):
                     )
             if file.component is not None:
                 raise ValueError('surface.component: pattern = "uv" takes all islands of the texture; leave it out')
-        found = None if self.find_seams is None or self.find_seams.find == "none" else self.find_seams.find
-        whole = f'[seams] find = "{found}"' if found else "[[seams_cut]]" if self.seams_cut else None
+        asked = self.find_seams
+        found = None if asked is None or (asked.find == "none" and not asked.keep) else asked.find
+        whole = "[seams] keep" if found == "none" else f'[seams] find = "{found}"' if found else None
+        whole = whole or ("[[seams_cut]]" if self.seams_cut else None)
         if whole and file is None:
             raise ValueError(f"{whole} takes a garment from a file")
         of_all_parts = file is not None and file.component == "all"

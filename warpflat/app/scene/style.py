@@ -103,7 +103,8 @@ def with_style(tables: Mapping[str, Any], style: Mapping[str, str], garment: str
         _form(found)
     except InputError as error:
         raise InputError(f"{garment}: these choices do not go together: {error}") from None
-    for key, text in style.items():
+    # Other edits are of the lowest edge, which a length moves.
+    for key, text in sorted(style.items(), key=lambda edit: edit[0] not in ("length", "sleeve-length")):
         known = style_options(found)
         if key.startswith("ease-"):
             eased = {_line_of(level, _part_of(level)): level for level in _eased(_form(found))}

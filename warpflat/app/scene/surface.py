@@ -128,7 +128,7 @@ def scene_pieces(scene: Scene) -> tuple[Surface, ...] | None:
     if not isinstance(table, FileSurface) or table.component != "all":
         return None
     meet = MEET if table.meet_mm is None else 1e-3 * table.meet_mm
-    return read_pieces(_file(scene, table), units=table.units, name=scene.name, meet=meet)
+    return read_pieces(_file(scene, table), units=table.units, prim=table.prim, name=scene.name, meet=meet)
 
 
 def scene_sewn_panels(scene: Scene) -> list[SewnPanel]:

@@ -266,7 +266,8 @@ def _move_end(
         cuts[number] = {**table, key: rounded(point)}
     else:
         name = table.get("name", table.get("line"))
-        cuts[number] = {"name": name, **{key: rounded(ends[at]) for at, key in given}}
+        kept = {key: value for key, value in table.items() if key not in ("line", "part", "plane")}
+        cuts[number] = {**kept, "name": name, **{key: rounded(ends[at]) for at, key in given}}
     return {"cuts": cuts}
 
 

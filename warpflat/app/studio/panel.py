@@ -218,7 +218,7 @@ def _head(session: Session) -> str:
             rows = f"<table style='width:100%;line-height:1.15'>{cells}</table>"
     lines = [" · ".join(words), rows]
     if solution is not None:
-        lines.append(_fit_words(solution))
+        lines += [_fit_words(solution), escape("; ".join(solution.notes))]
         lines.append(
             relaxation_words([stage.as_dict() for stage in piece.stages] for piece in solution.pieces.values())
         )

@@ -25,7 +25,8 @@ from warpflat.garment import Drape, drape
 __all__ = ["Preview", "Session", "Step"]
 
 # Tables that name pieces, edges and seams of a form: another form has others.
-_OF_ONE_FORM = ("cuts", "seams", "constraints", "openings", "finishing")
+_OF_ONE_FORM = ("cuts", "seams", "constraints", "openings", "finishing", "pockets")
+_OF_ONE_PATTERN = ("names", "kinds", "allowances_mm")
 
 
 @dataclass(kw_only=True, eq=False)
@@ -171,7 +172,9 @@ class Session:
         """Take another shipped form; cuts, seams and whatever names pieces of the one before are left out."""
         settings = self.scene.settings
         left_out = [key for key in _OF_ONE_FORM if getattr(settings, key)]
-        tables: dict[str, Any] = {"form": form, **dict.fromkeys(_OF_ONE_FORM)}
+        left_out += [f"pattern.{key}" for key in _OF_ONE_PATTERN if getattr(settings.pattern, key)]
+        pattern = {key: value for key, value in settings.pattern.given().items() if key not in _OF_ONE_PATTERN}
+        tables: dict[str, Any] = {"form": form, **dict.fromkeys(_OF_ONE_FORM), "pattern": pattern or None}
         self.change("form", **tables)
         if left_out and not self.error:
             self.note = f"left out, since they belong to the form before: {', '.join(left_out)}"

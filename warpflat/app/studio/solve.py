@@ -22,7 +22,9 @@ __all__ = ["Solution", "solve"]
 # What the surface, the body and the form of a scene are made from.
 _OF_SURFACE = ("name", "surface", "lines", "datum", "constraints", "seams")
 _OF_BODY = ("mannequin",)
-_OF_FORM = ("form", "half", "shape", "ease", "cuts", "auto_cut", "openings")
+_OF_FORM = (
+    "form", "half", "shape", "ease", "cuts", "auto_cut", "openings", "finishing", "pulled_on", "fabric", "fabric_files"
+)  # fmt: skip
 # What may differ while one cut more is made in a piece that lies there already.
 _CUTS_ONLY = ("cuts", "output", "pattern", "marker")
 
@@ -36,7 +38,7 @@ class Solution:
         pieces: by name.
         bare: the surface of the scene before its cuts; None of a form.
         plan, garment: of a form; None of a surface.
-        notes: what was chosen on the way.
+        notes: what was chosen or left out on the way, without what is known of the body.
     """
 
     scene: Scene
@@ -120,7 +122,13 @@ def solve(
         settled, notes = opened[0], (*notes, *opened[1])
         plan = plan_garment(settled, built=(mannequin, scene_form(settled, mannequin, before=plan.form)[1]))
         garment = plan.flatten(callback=callback, known=_known(plan, before))
-    return Solution(scene=scene, pieces=garment.pieces, plan=plan, garment=garment, notes=(*notes, *garment.notes))
+    return Solution(
+        scene=scene,
+        pieces=garment.pieces,
+        plan=plan,
+        garment=garment,
+        notes=(*notes, *garment.form.notes, *garment.remarks),
+    )
 
 
 def _one_more_cut(scene: Scene, before: Solution, sequence: CutSequence) -> CutPlan | None:

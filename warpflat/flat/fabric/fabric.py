@@ -208,11 +208,6 @@ class Fabric:
         asked = Provenance(source="asked for", unit="degrees")
         return replace(self, shear_limit=shear_limit, provenance={**self.provenance, "shear_limit": asked})
 
-    @property
-    def softness(self) -> float:
-        """K/G, the tensile stiffness along the stiffer threads over the shear stiffness."""
-        return max(self.stiffness_warp, self.stiffness_weft) / self.shear_stiffness
-
     def stretch(self, direction: Literal["warp", "weft"] = "warp") -> float:
         """Return the strain at which the cloth pulls with 98.1 N/m, a hand's pull, along one direction; a share."""
         strains = np.linspace(0.0, 2.0, 4001)

@@ -16,7 +16,7 @@ from warpflat.flat.surface.paths.lines import line_between, line_from_indices, l
 from warpflat.flat.surface.triangles import triangulate
 from warpflat.flat.surface.vectors import cross, norm, points_at
 
-__all__ = ["choose_and_name_datum", "choose_datum", "datum_extent"]
+__all__ = ["choose_datum", "datum_extent"]
 
 # A datum is level if it leaves its plane by less than this share of its length.
 _LEVEL = 1e-6
@@ -36,8 +36,8 @@ _ALIKE = 0.95
 _HANGS = np.cos(np.radians(10.0))
 
 
-def choose_datum(surface: Surface) -> IntArray:
-    """Return the line along the piece's long axis through its middle, as vertex indices along edges.
+def choose_datum(surface: Surface) -> tuple[IntArray, str]:
+    """Return the line along the piece's long axis through its middle, as vertex indices along edges, and a description of it.
 
     The long axis is the first principal axis of the surface. Where length and width are within a fifth of each other it is the
     one of the two that is nearer to the vertical (+y), and the vertical itself where that leans by no more than 10 degrees from
@@ -45,11 +45,6 @@ def choose_datum(surface: Surface) -> IntArray:
     the mean normal, or a parallel one beside it whose line has its ends far more level. Of a band that this cuts crosswise,
     since it curls, the line runs through the middle from end to end instead.
     """
-    return choose_and_name_datum(surface)[0]
-
-
-def choose_and_name_datum(surface: Surface) -> tuple[IntArray, str]:
-    """Return the line of `choose_datum`, and a description of it."""
     triangles, _ = triangulate(surface.faces)
     p = points_at(surface.vertices, triangles.T)
     normal = cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
@@ -144,7 +139,7 @@ def resolve_datum(surface: Surface, datum: str | ArrayLike | None) -> tuple[IntA
     """Return the datum as vertex indices, its name, and a note if it was chosen here."""
     if datum is None:
         report_activity("developing the piece")
-        line, along = choose_and_name_datum(surface)
+        line, along = choose_datum(surface)
         return line, "datum", [f"datum chosen: {along}, {datum_extent(surface, line)}"]
     if isinstance(datum, str):
         if datum not in surface.lines:

@@ -51,8 +51,9 @@ class Body:
         """Return the nearest place of the surface (#P by 3 [m]) and its interpolated unit normal there, for #P by 3 points [m]."""
         given = wp.array(points, dtype=wp.vec3d, device=self.device)
         centre, normal = (wp.zeros(len(points), dtype=wp.vec3d, device=self.device) for _ in range(2))
-        inputs = [wp.uint64(self.mesh.id), self.normals, given, _FAR]
-        launch_each(find_planes, len(points), inputs, [centre, normal], device=self.device, least=256)
+        inputs = [wp.uint64(self.mesh.id), self.normals, given, _FAR, 0.0]
+        ball = wp.zeros(len(points), dtype=wp.float64, device=self.device)
+        launch_each(find_planes, len(points), inputs, [centre, normal, ball], device=self.device, least=256)
         return centre.numpy().copy(), normal.numpy().copy()
 
     def gaps(self, points: FloatArray) -> FloatArray:

@@ -41,6 +41,9 @@ _LONGEST_STEP = 0.05
 # and no step of dynamic relaxation longer than this [m].
 _LONGEST_EXPLICIT_STEP = 1e-3
 _REACH = 0.15  # [m]
+# Where a vertex passes from one side of a groove to the other, the groove is filled as far as a ball does not enter whose radius is this
+# share of an edge. With half an edge cloth that is tight over the crotch did not come to rest.
+_BALL = 0.25
 # A metric for far steps: least share of the tensile stiffness under compression, and a tension that is added in all directions [N/m].
 # Steps by a softer one are too long where cloth becomes taut, and across cloth without tension.
 _FAR_COMPRESSION, _FAR_PULL = 0.3, 10.0
@@ -85,7 +88,7 @@ class DrapeEnergy:
         )
         self.contact = contact = Contact()
         contact.centre, contact.normal, contact.rubbed, contact.anchor = (self._zeros(wp.vec3d) for _ in range(4))
-        contact.pressed, contact.most, contact.depth = (self._zeros(wp.float64) for _ in range(3))
+        contact.pressed, contact.most, contact.depth, contact.ball = (self._zeros(wp.float64) for _ in range(4))
         contact.friction, contact.longest_step = options.friction, _LONGEST_EXPLICIT_STEP
         contact.skin, contact.grip = (self._on(each * vertex_area, wp.float64) for each in (_SKIN, _GRIP))
         bending = Bending()
@@ -126,8 +129,9 @@ class DrapeEnergy:
         self._evaluate = Sequence([*self.evaluate_cells, gather])
         self.planes = []
         if body is not None:
-            query = [wp.uint64(body.mesh.id), body.normals, x, _REACH]
-            outputs = [self.contact.centre, self.contact.normal]
+            ball = _BALL * float(np.sqrt(vertex_area.mean()))
+            query = [wp.uint64(body.mesh.id), body.normals, x, _REACH, ball]
+            outputs = [contact.centre, contact.normal, contact.ball]
             self.planes = [record(find_planes, dim=count, inputs=query, outputs=outputs, least=256, turns=4, **at)]
         self._renew = Sequence([*self.planes, *self.evaluate_cells])
         self._keep = body

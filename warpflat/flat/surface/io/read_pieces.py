@@ -27,7 +27,12 @@ __all__ = ["object_parts", "read_pieces"]
 
 
 def read_pieces(
-    path: str | PathLike[str], *, units: str | None = None, name: str | None = None, meet: float = MEET
+    path: str | PathLike[str],
+    *,
+    units: str | None = None,
+    prim: str | None = None,
+    name: str | None = None,
+    meet: float = MEET,
 ) -> tuple[Surface, ...]:
     """Read all pieces of a garment: each connected part of each object of an OBJ file, node of a GLB scene or mesh prim of a USD stage.
 
@@ -38,6 +43,7 @@ def read_pieces(
     Args:
         path: the file.
         units: as :func:`warpflat.read_surface`.
+        prim: the path or name of the only mesh prim of a USD stage that is read; all if not given.
         name: for pieces that have none in the file; by default the file's stem.
         meet: borders that run along each other within this distance [m] are made to agree vertex by vertex, so that they are sewn; 0
             leaves them as they are.
@@ -48,7 +54,7 @@ def read_pieces(
     Raises:
         InputError: one line that names the file, and the object where there are several.
     """
-    file, raw, scale, sources = read_mesh_file(path, units=units, prim=ALL_PRIMS, name=name)
+    file, raw, scale, sources = read_mesh_file(path, units=units, prim=prim or ALL_PRIMS, name=name)
     vertices = raw.vertices * scale
     found: list[Surface] = []
     closed, small = list[float](), list[float]()
