@@ -524,6 +524,8 @@ def test_drafting_twice_gives_the_same_to_the_bit():
         (lambda: square(edges=square().edges[:3]), "ends"),
         (lambda: square(edges=[Edge(name=e.name, points=e.points[::-1]) for e in square().edges[::-1]]), "clockwise"),
         (lambda: square(quantity=0), "at least 1"),
+        (lambda: square(also={"fusible": 0}), "quantity is 0"),
+        (lambda: square(marks={"button": (0.1, np.nan)}), "mark 'button': point 0 is not finite"),
         (lambda: square(grain=np.zeros((2, 2))), "two different points"),
         (lambda: square(darts=[Dart(name="d", left="top", right="left")]), "not 'dart'"),
         (

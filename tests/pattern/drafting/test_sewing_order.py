@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from polygons import polygon, sewn
+from polygons import corners_of, polygon, sewn
 
 from warpflat.core.errors import InputError
 from warpflat.garment.construction.details import FinishingTable
@@ -16,7 +16,7 @@ from warpflat.garment.construction.finishing import finish_edges
 from warpflat.garment.construction.linings import add_interfacing, add_lining
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.piece_parts import Edge
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
+from warpflat.pattern.drafting.pieces import Elastic, Pattern, Piece, Seam, SeamOpening, SeamSide
 from warpflat.pattern.drafting.seam_words import joint_words
 from warpflat.pattern.drafting.sewing_order import notions, seam_letters, sewing_steps, sewn_seams
 from warpflat.pattern.drafting.words import language_words, printed_in
@@ -372,3 +372,16 @@ def test_letters_on_the_pieces_are_those_of_the_guide_in_all_sizes():
     for name, length in {"one": 200.0, "two": 400.0}.items():
         (seam,) = (seam for seam in sewn_seams(drafted, "M") if seam.letter == letters[name])
         assert seam.length_mm[0] == pytest.approx(length)
+
+
+def test_a_pocket_sewn_to_a_waistband_and_an_elastic_along_no_edge_stop_nothing():
+    bag = replace(polygon("bag", corners_of(0.1, 0.2)), role="pocket")
+    band = replace(polygon("band", corners_of(0.1, 0.05)), role="waistband")
+    nowhere = Elastic(edge="waist", width=0.03, lengths={"": 0.6})
+    pattern = Pattern(name="skirt", pieces={"": [bag, band]}, seams=[sewn("bag.e2", "band.e0")], elastics=[nowhere])
+    steps = sewing_steps(draft_garment(pattern), "")
+    assert steps
+    assert not any("elastic" in notion for notion in notions(steps))
+    raw = Pattern(name="strap", pieces={"": [polygon("ring", corners_of(0.1, 0.2), kinds=["fold", *["seam"] * 3])]})
+    alone = replace(raw, elastics=[nowhere])
+    assert len(notions(sewing_steps(draft_garment(alone), ""))) == 1

@@ -353,7 +353,8 @@ def test_a_band_whose_ends_meet_is_opened_where_a_zip_would_be(tmp_path: Path):
 
 def test_what_garmentcode_does_not_know_is_named(command: Command):
     hole = Hole(name="eye", points=0.05 * np.array([(1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (1.0, 2.0)]))
-    cloth = piece_of("cloth", [(0.0, 0.0), (0.3, 0.0), (0.3, 0.3), (0.0, 0.3)], holes=[hole])
+    lines = {"hip": np.array([(0.02, 0.2), (0.28, 0.2)])}
+    cloth = piece_of("cloth", [(0.0, 0.0), (0.3, 0.0), (0.3, 0.3), (0.0, 0.3)], holes=[hole], internal_lines=lines)
     sides = side_of("cloth.e1", reversed=False), side_of("cloth.e3", reversed=True)
     seams = [Seam(name=name, sides=sides) for name in ("first", "second")]
     Path("run").mkdir()
@@ -362,6 +363,7 @@ def test_what_garmentcode_does_not_know_is_named(command: Command):
     assert ended.code == 0
     assert ended.out == "run: p_specification.json\n"
     assert "cloth: GarmentCode knows no holes: eye left out" in ended.err
+    assert "cloth: GarmentCode knows no lines inside: hip left out" in ended.err
     assert "seam 'second': one of its edges is in another seam" in ended.err
     assert [seam.name for seam in read_pattern("run/p_specification.json").seams] == ["first"]
 

@@ -154,6 +154,15 @@ def test_texts_name_style_piece_size_and_units(file):
         assert expected in piece
 
 
+def test_the_sample_size_is_one_that_is_written_and_notes_say_what_is_cut(dress, tmp_path):
+    write_dxf(dress, tmp_path / "p.dxf", sizes=["36", "40"], rul=tmp_path / "p.rul")
+    assert "SAMPLE SIZE: 36" in (tmp_path / "p.dxf").read_text()
+    assert "SAMPLE SIZE: 36" in (tmp_path / "p.rul").read_text()
+    square = Piece(name="square", edges=sides([(0, 0), (0.2, 0), (0.2, 0.2), (0, 0.2)]), quantity=3)
+    write_dxf(draft_garment(Pattern(name="p", pieces={"": [square]})), tmp_path / "q.dxf")
+    assert "ANNOTATION: Cut 3" in (tmp_path / "q.dxf").read_text()
+
+
 def test_inches(dress, tmp_path):
     write_dxf(dress, tmp_path / "p.dxf", units="english", sizes=["38"])
     document = ezdxf.readfile(tmp_path / "p.dxf")

@@ -9,10 +9,12 @@ from pathlib import Path
 import ezdxf
 import numpy as np
 import pytest
+from polygons import drafted, polygon
 from pypdf import PdfReader
 from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
+from warpflat.pattern.drafting.cut_list import cloths_of
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.drawing import draw_piece
@@ -21,11 +23,13 @@ from warpflat.pattern.drafting.measures import length_words, name_in_units
 from warpflat.pattern.drafting.piece_parts import Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece
 from warpflat.pattern.drafting.sewing_order import sewing_steps
+from warpflat.pattern.drafting.words import language_words
 from warpflat.pattern.drafting.worn import Measure, NeededOpening, ViewedPiece, Worn
 from warpflat.pattern.export.dxf import write_dxf
 from warpflat.pattern.export.pattern_files import check_names
-from warpflat.pattern.export.pattern_json import pattern_from_json, pattern_json
+from warpflat.pattern.export.pattern_json import pattern_from_json, pattern_json, write_pattern_json
 from warpflat.pattern.export.pdf import write_pdf
+from warpflat.pattern.export.read_pattern import read_drafted
 from warpflat.pattern.export.svg import write_svg
 
 
@@ -147,3 +151,23 @@ def test_a_length_in_a_name_has_the_units_of_the_pattern():
         "invisible zip 7 7/8 in",
     ]
     assert name_in_units("hem 2", "cm") == "hem 2"
+    assert name_in_units("zip 12.5 mm", "in") == "zip 1/2 in"
+
+
+def test_a_pattern_in_other_units_keeps_its_language(tmp_path: Path):
+    german = replace(sample_dress(("38",)), words=language_words("de"))
+    write_pattern_json(draft_garment(german), tmp_path / "pattern.json")
+    (piece, *_) = read_drafted(tmp_path / "pattern.json", units="in").pieces["38"]
+    said = [text for text, _ in piece.label.lines]
+    assert any("zuschneiden" in text for text in said), said
+
+
+def test_what_is_cut_from_a_cloth_is_told_with_all_mirrored_copies(tmp_path: Path):
+    cuff = polygon(
+        "cuff", [(0.0, 0.0), (0.2, 0.0), (0.3, 0.1)], fabric="wool", quantity=4, also={"fusible": 2, "wool": 2}
+    )
+    assert cloths_of(drafted(cuff).pieces[""][0]) == {"wool": 6, "fusible": 2}
+    write_pdf(drafted(cuff), tmp_path / "p.pdf")
+    said = " ".join(page.extract_text() for page in PdfReader(tmp_path / "p.pdf").pages)
+    assert "cuff 6, 3 mirrored" in said
+    assert "cuff 2, 1 mirrored" in said

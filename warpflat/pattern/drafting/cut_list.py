@@ -32,7 +32,8 @@ class CutEntry:
 
 def cloths_of(piece: DraftedPiece) -> dict[str, int]:
     """Return the cloths from which a piece is cut, and how often."""
-    return {piece.piece.fabric: piece.piece.quantity, **piece.piece.also}
+    cloth, also = piece.piece.fabric, piece.piece.also
+    return {cloth: 0, **also} | {cloth: piece.piece.quantity + also.get(cloth, 0)}
 
 
 def turned_over(piece: DraftedPiece, quantity: int) -> list[bool]:

@@ -46,7 +46,7 @@ def cloth_words(length: float, units: str = "cm", *, of_width: bool = False) -> 
 
 def name_in_units(name: str, units: str) -> str:
     """Return the name of a line, such as "invisible zip 200 mm", with the length at its end in the units of a pattern."""
-    return re.sub(r"\b(\d+) mm$", lambda found: length_words(int(found[1]) / 1e3, units), name)
+    return re.sub(r"\b(\d+(?:\.\d+)?) mm$", lambda found: length_words(float(found[1]) / 1e3, units), name)
 
 
 def _number(digits: str) -> str:

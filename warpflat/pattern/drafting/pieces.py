@@ -82,13 +82,15 @@ class Piece:
             raise InputError(f"{where}: unknown units {self.units!r}; {nearest(self.units, UNITS)}")
         if self.role not in get_args(Role):
             raise InputError(f"{where}: unknown role {self.role!r}; {nearest(self.role, get_args(Role))}")
-        if min(self.quantity, *self.also.values(), self.quantity) < 1:
-            raise InputError(f"{where}: quantity is {self.quantity}; it must be at least 1")
+        if (least := min([self.quantity, *self.also.values()])) < 1:
+            raise InputError(f"{where}: quantity is {least}; it must be at least 1")
         object.__setattr__(self, "edges", tuple(self.edges))
         object.__setattr__(self, "darts", tuple(self.darts))
         object.__setattr__(self, "holes", tuple(self.holes))
         lines = {k: check_points(v, f"{where}, line {k!r}", at_least=2) for k, v in self.internal_lines.items()}
         object.__setattr__(self, "internal_lines", lines)
+        marks = {k: check_points([at], f"{where}, mark {k!r}", at_least=1)[0] for k, at in self.marks.items()}
+        object.__setattr__(self, "marks", marks)
         if self.grain is not None:
             grain = check_points(self.grain, f"{where}, grain", at_least=2)
             if len(grain) != 2 or np.linalg.norm(grain[1] - grain[0]) < SAME_POINT:

@@ -309,8 +309,8 @@ class SewingTasks:
         inseam = [place[0] for place in self._free if place[0] in bags and place[1] == "opening"]
         self._add("inseam_bag", inseam, self._take_of(inseam, ("cut",)))
         rims = [task for task in self.tasks if task.technique in ("pocket_rim", "inseam_rim", "pocket_opening")]
-        for place in self._take_of(bags):
-            next(task for task in rims if place[0] in pieces_of(task.sewn)).uses.append(place)
+        for task in rims:
+            task.uses.extend(self._take_of([name for name in bags if name in pieces_of(task.sewn)]))
         shell = [name for name in self._with_role("shell") if name in loose]
         straps = [name for name in shell if all(edge.kind == "cut" for edge in self.pieces[name].edges)]
         self._add("strap", straps, self._take_of(straps))
@@ -404,6 +404,8 @@ class SewingTasks:
             "width": length_words(elastic.width, self.units),
             "length": length_words(elastic.lengths[self.size], self.units),
         }
+        if not along:
+            return
         self._add("casing" if cased else "elastic_band", pieces_of(along), cased, **values)
         word = "elastic" if elastic.count == 1 else "elastics"
         notion = translate(f"{{count}} {word} of {{length}}, at most {{width}} wide", count=elastic.count, **values)

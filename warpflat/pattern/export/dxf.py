@@ -78,7 +78,8 @@ def write_dxf(
         raise InputError(f"unknown DXF units {units!r}; {nearest(units, UNITS)}")
     chosen = tuple(garment.pieces) if sizes is None else tuple(sizes)
     scale, created = UNITS[units], source_date()
-    rules = grade_rules(garment, chosen) if rul is not None and len(chosen) > 1 else None
+    sample = garment.garment.sample if garment.garment.sample in chosen else chosen[0]
+    rules = grade_rules(garment, chosen, sample) if rul is not None and len(chosen) > 1 else None
     blocks, space, taken = list[str](), list[str](), set[str]()
     seams = seam_words(garment.garment.seams)
     names = {piece.name: piece.piece.title or piece.name for row in garment.pieces.values() for piece in row}
@@ -95,7 +96,10 @@ def write_dxf(
                 f"QUANTITY: {piece.piece.quantity}",
                 f"CATEGORY: {'FOLD' if piece.piece.on_fold else 'PIECE'}",
                 f"FABRIC: {' / '.join(cloths_of(piece))}",
-                *("ANNOTATION: " + text.replace("\n", " ") for text, _ in piece.label.lines[2:3]),
+                *(
+                    "ANNOTATION: " + text.replace("\n", " ")
+                    for text, _ in piece.label.lines[1 + bool(piece.size) :][:1]
+                ),
             ]
             low, high = piece.label.box.min(axis=0), piece.label.box.max(axis=0)
             widest = max(text_width(text, 1.0) for text in texts)
@@ -115,7 +119,7 @@ def write_dxf(
         f"STYLE NAME: {garment.name}",
         *made,
         program[0],
-        f"SAMPLE SIZE: {garment.garment.sample}",
+        f"SAMPLE SIZE: {sample}",
         *([f"GRADE RULE TABLE: {table}"] if rules is not None and table else []),
         f"UNITS: {units.upper()}",
         *program[1:],
@@ -315,13 +319,12 @@ class GradeRules:
         return len(self.moves)
 
 
-def grade_rules(garment: DraftedGarment, sizes: Sequence[str]) -> GradeRules:
-    """Return the grade rules of a nest: rule 1 moves nothing.
+def grade_rules(garment: DraftedGarment, sizes: Sequence[str], sample: str) -> GradeRules:
+    """Return the grade rules of a nest, from the sample size to each size: rule 1 moves nothing.
 
     Graded are the corners of the cutting line, places between them on curved edges, notches and drill holes; each is the same
     place in every size. A place, or a piece, that some size does not have is not graded.
     """
-    sample = garment.garment.sample if garment.garment.sample in sizes else sizes[0]
     rules = GradeRules(sizes=tuple(sizes), sample=sample)
     rules.rule(np.zeros((len(sizes), 2)))
     for piece in garment.pieces[sample]:

@@ -59,9 +59,10 @@ def garmentcode_json(garment: DraftedGarment, *, size: str | None = None) -> tup
     chosen = garment.garment.sample if size is None else size
     garment.garment.check_size(chosen)
     left_out = [
-        f"{piece.name}: GarmentCode knows no holes: {', '.join(holes)} left out"
+        f"{piece.name}: GarmentCode knows no {what}: {', '.join(names)} left out"
         for piece in garment.pieces[chosen]
-        if (holes := [*piece.cutouts, *piece.fisheyes])
+        for what, names in (("holes", [*piece.cutouts, *piece.fisheyes]), ("lines inside", piece.internal_lines))
+        if names
     ]
     pieces, seams, _ = whole_pieces(map(_drawn, garment.pieces[chosen]), garment.garment.seams, unsewn=True)
     lines = {(name, edge.name): edge.points for name, piece in pieces.items() for edge in piece.edges}

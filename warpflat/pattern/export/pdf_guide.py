@@ -157,8 +157,9 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
         for cloth, entries in cloths.items():
             cut = []
             for entry in entries:
-                how = " on fold" if entry.on_fold else ", one mirrored" if entry.mirrored == 1 else ""
-                cut.append(translate(f"{{title}} {{count}}{how}", title=entry.title, count=entry.quantity))
+                how = " on fold" if entry.on_fold else ", {mirrored} mirrored" if entry.mirrored else ""
+                values = {"title": entry.title, "count": entry.quantity, "mirrored": entry.mirrored}
+                cut.append(translate(f"{{title}} {{count}}{how}", **values))
             page.paragraph("; ".join(cut), indent=0.030, lead=translate_name(cloth))
     page.heading(translate("Sewing order"), 3 * LINE + STEP_HEIGHT)
     page.paragraph(

@@ -11,6 +11,7 @@ from warpflat.core import InputError, guarded, make_file_name
 from warpflat.pattern.drafting.draft import draft_garment, relabelled
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.pieces import Pattern
+from warpflat.pattern.drafting.words import printed_in
 from warpflat.pattern.export.pattern_json import pattern_from_json, read_pattern_data
 from warpflat.pattern.export.read_dxf import read_dxf
 from warpflat.pattern.export.read_garmentcode import garmentcode_pattern
@@ -64,12 +65,13 @@ def read_drafted(
         if units is None:
             return found
         garment = _printed_in(found.garment, units)
-        rows = {
-            size: tuple(
-                relabelled(replace(piece, piece=garment.piece(piece.name, size)), garment.name, ()) for piece in row
-            )
-            for size, row in found.pieces.items()
-        }
+        with printed_in(garment.words):
+            rows = {
+                size: tuple(
+                    relabelled(replace(piece, piece=garment.piece(piece.name, size)), garment.name, ()) for piece in row
+                )
+                for size, row in found.pieces.items()
+            }
         return replace(found, garment=garment, pieces=rows)
     with guarded(Path(path), "pattern"):
         wide = {
