@@ -178,7 +178,8 @@ def _size_tags(piece: DraftedPiece, name: str, share: float, joints: Sequence[Fl
 
 def _strokes(piece: DraftedPiece, paper: OnPaper | None, *, nested: bool = False) -> list[Stroke]:
     """Return the lines of a piece; of one in a nest the sewing lines are hidden."""
-    sewing = [_edge_stroke(piece, edge) for edge in piece.edges if paper is None or edge.kind != "fold"]
+    edges = [edge for edge in piece.edges if paper is None or edge.kind != "fold"]
+    sewing = [stroke for edge in edges for stroke in _edge_strokes(piece, edge)]
     # Holes that have an allowance have a sewing line, too.
     sewing += [
         Stroke(role="sew", name=f"{name}.sew", points=cutout.sew_line, closed=True)
@@ -186,7 +187,7 @@ def _strokes(piece: DraftedPiece, paper: OnPaper | None, *, nested: bool = False
         if cutout.width > 0
     ]
     if nested:
-        sewing = [replace(line, hidden=line.role not in ("dart", "fold")) for line in sewing]
+        sewing = [replace(line, hidden=line.hidden or line.role not in ("dart", "fold")) for line in sewing]
     return [*_cut_strokes(piece, open_folds=paper is not None), *sewing, *_detail_strokes(piece)]
 
 
@@ -204,7 +205,7 @@ def _cut_strokes(piece: DraftedPiece, *, open_folds: bool) -> list[Stroke]:
         on_fold |= np.maximum(*away) < ON_FOLD
     if not on_fold.any() or on_fold.all():
         whole = Stroke(role="cut", name="cut", points=ring, closed=True)
-        return [whole, *(_edge_stroke(piece, edge) for edge in piece.fold_edges)]
+        return [whole, *(stroke for edge in piece.fold_edges for stroke in _edge_strokes(piece, edge))]
     first = next(k for k in range(len(ring)) if on_fold[k - 1] and not on_fold[k])
     order = np.roll(np.arange(len(ring)), -first)
     changes = [k for k in range(len(ring)) if on_fold[order[k]] != on_fold[order[k - 1]]]
@@ -223,10 +224,12 @@ def _cut_strokes(piece: DraftedPiece, *, open_folds: bool) -> list[Stroke]:
     return strokes
 
 
-def _edge_stroke(piece: DraftedPiece, edge: DraftedEdge) -> Stroke:
+def _edge_strokes(piece: DraftedPiece, edge: DraftedEdge) -> list[Stroke]:
+    """Return an edge with its name; of a pleat's leg what is sewn is seen, and the whole leg, which readers need, is hidden."""
     role = edge.kind if edge.kind in ("hem", "fold", "dart") else "sew"
     line = piece.drawn_line(edge)
-    return Stroke(role=role, name=edge.name, points=line, curve=edge.curve if line is edge.line else None)
+    whole = Stroke(role=role, name=edge.name, points=edge.line, curve=edge.curve, hidden=line is not edge.line)
+    return [whole, Stroke(role=role, name="", points=line)] if whole.hidden else [whole]
 
 
 def _detail_strokes(piece: DraftedPiece) -> list[Stroke]:

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core import FARTHEST, FloatArray, InputError, unit
+from warpflat.core import FARTHEST, FloatArray, InputError, polyline_length, unit
 from warpflat.pattern.drafting.corners import find_corners
 from warpflat.pattern.drafting.curves import CHORD
 from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT, MOST_ALLOWANCE, Dart, Edge
 from warpflat.pattern.drafting.polygons import half_plane, mirror_image, signed_area, turn_between
 
-__all__ = ["boundary_edges", "chain_edges", "find_darts", "inset", "split_outline", "with_drawn_allowances"]
+__all__ = ["boundary_edges", "inset", "named_outline", "split_outline", "with_drawn_allowances"]
 
 # Ends that are closer than this are one corner [m].
 _SAME = 5e-4
@@ -22,16 +22,31 @@ _SAME = 5e-4
 _MOST_POINTS = 5000
 
 
-def chain_edges(parts: Sequence[tuple[str, str, FloatArray]], where: str) -> list[Edge]:
-    """Return open lines as the edges of one closed outline, counter-clockwise.
+def named_outline(
+    parts: Sequence[tuple[str, str, FloatArray]],
+    tips: Mapping[str, FloatArray],
+    legs: Sequence[FloatArray],
+    cutting: Sequence[FloatArray],
+    where: str,
+) -> tuple[list[Edge], list[Dart]]:
+    """Return the edges and darts of a piece whose file names its edges.
 
     Args:
-        parts: name, kind and points (#P by 2 [m]) of each, in any order and direction.
+        parts: name, kind and points (#P by 2 [m]) of each edge, in any order and direction; legs are of kind "dart".
+        tips: by name of the dart [m].
+        legs: other lines (#P by 2 [m]): of the legs of pleats as much as is sewn.
+        cutting: lines (#P by 2 [m]) from which the allowances are measured.
         where: what messages begin with.
 
     Raises:
-        InputError: they do not close.
+        InputError: the edges do not close, or a leg has no tip.
     """
+    edges = _chain_edges(parts, where)
+    return with_drawn_allowances(edges, cutting) if cutting else edges, _find_darts(edges, tips, legs, where)
+
+
+def _chain_edges(parts: Sequence[tuple[str, str, FloatArray]], where: str) -> list[Edge]:
+    """Return lines as the edges of one closed outline, counter-clockwise."""
     chain = [parts[0]]
     # The last end of each line stands before its first: of two that are as near, the line is turned.
     ends = np.array([points[[-1, 0]] for _, _, points in parts])
@@ -150,28 +165,37 @@ def boundary_edges(
     ]
 
 
-def find_darts(edges: Sequence[Edge], tips: Mapping[str, FloatArray], where: str) -> list[Dart]:
-    """Return the darts whose tips are known: two legs that follow each other and meet there.
-
-    Args:
-        edges: of an outline; legs are of kind "dart".
-        tips: by name of the dart [m].
-        where: what messages begin with.
-
-    Raises:
-        InputError: legs without a tip.
-    """
+def _find_darts(
+    edges: Sequence[Edge], tips: Mapping[str, FloatArray], legs: Sequence[FloatArray], where: str
+) -> list[Dart]:
+    """Return the darts whose tips are known: two legs that follow each other and meet there."""
     darts = []
     for left, right in zip(edges, [*edges[1:], *edges[:1]], strict=True):
         if left.kind == right.kind == "dart":
             names = [name for name, tip in tips.items() if np.linalg.norm(left.points[-1] - tip) < _SAME]
             if names:
-                darts.append(Dart(name=names[0], left=left.name, right=right.name))
-    legs = {leg for dart in darts for leg in (dart.left, dart.right)}
+                depth = _sewn_depth(left.points, legs)
+                darts.append(Dart(name=names[0], left=left.name, right=right.name, pleat=depth))
+    found = {leg for dart in darts for leg in (dart.left, dart.right)}
     for edge in edges:
-        if edge.kind == "dart" and edge.name not in legs:
+        if edge.kind == "dart" and edge.name not in found:
             raise InputError(f"{where}: leg {edge.name!r} has no dart; its name must stand at the tip")
     return darts
+
+
+def _sewn_depth(leg: FloatArray, lines: Sequence[FloatArray]) -> float | None:
+    """Return the length [m] of the line that lies on the beginning of a leg (#P by 2 [m] each); None if none does."""
+    import shapely
+
+    whole: Any = shapely.LineString(leg)
+    for line in (*lines, *(each[::-1] for each in lines)):
+        depth = polyline_length(line)
+        if (
+            np.linalg.norm(line[0] - leg[0]) < _SAME
+            and whole.distance(shapely.Point(line[-1])) < _SAME < whole.length - depth
+        ):
+            return depth
+    return None
 
 
 def inset(ring: FloatArray, allowance: float, where: str, fold: FloatArray | None = None) -> FloatArray:

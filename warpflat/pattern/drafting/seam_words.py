@@ -10,6 +10,9 @@ from warpflat.pattern.drafting.pieces import Seam, SeamSide
 
 __all__ = ["joint_words", "seam_words", "seams_of_words"]
 
+# What is written at an edge; a seam's name may have anything in it.
+_WORDS = re.compile(r"\A(.+) \| side ([12]) part (\d+) \| ([^|]+?)(?: \| ease (\S+ \S+ \S+))?\Z")
+
 
 def joint_words(seam: Seam) -> str:
     """Return what sewers call a seam: "crown to side front", by the pieces of both sides, without their numbers."""
@@ -48,17 +51,16 @@ def seams_of_words(found: Iterable[tuple[str, str, str]]) -> list[Seam]:
     eases: dict[str, Sequence[float]] = {}
     for piece, edge, words in found:
         try:
-            name, place, how, *rest = words.split(" | ")
-            _, number, _, part = place.split(" ")
+            [(name, number, part, how, ease)] = _WORDS.findall(words)
             chain = sides.setdefault(name, ({}, {}))[int(number) - 1]
             side = SeamSide(
                 piece=piece, edge=edge, reversed="against" in how, mirrored="mirrored" in how,
                 copy=int(how.partition("copy ")[2] or 1) - 1,
             )  # fmt: skip
             chain[int(part)] = side
-            if rest:
-                eases[name] = [float(value) for value in rest[0].split(" ")[1:4]]
-        except (ValueError, IndexError):
+            if ease:
+                eases[name] = [float(value) for value in ease.split(" ")]
+        except ValueError:
             raise InputError(f"seam {words!r} at {piece}.{edge}: must read 'NAME | side 1 part 1 | with'") from None
     seams = []
     for name, (first, second) in sides.items():

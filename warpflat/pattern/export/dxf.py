@@ -2,7 +2,8 @@
 
 The file has an empty header, no tables and no layout blocks: some CAD systems refuse others. Layers are numbers: 1 boundary
 and system text, 2 turn points, 3 curve points, 4 slit notches, 6 mirror line, 7 grain, 8 internal lines, 11 cutouts, 13 drill
-holes, 14 sewing lines, 15 annotation; ASTM adds validation curves, 84 of the boundary and 87 of the sewing line.
+holes, 14 sewing lines, 15 annotation, 16 legs of pleats up to the tip, of which layer 8 has what is sewn; ASTM adds validation
+curves, 84 of the boundary and 87 of the sewing line.
 """
 
 from __future__ import annotations
@@ -159,6 +160,8 @@ def _lines(
             # The legs of a dart that is cut away are seams with an allowance, those of a folded one lie inside.
             line = piece.drawn_line(edge)
             _polyline(block, line, scale, "8" if edge.kind == "dart" and edge.width == 0 else "14")
+            if line is not edge.line:
+                _polyline(block, edge.line, scale, "16")
         texts = [f"EDGE: {edge.name}", *(f"SEAM: {words}" for words in seams.get((piece.name, edge.name), ()))]
         middle = edge.line[len(edge.line) // 2] if len(edge.line) > 2 else edge.line.mean(axis=0)
         for row, text in enumerate(texts):

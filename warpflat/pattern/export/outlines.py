@@ -72,6 +72,11 @@ class DrawnLine:
     group: str = ""
     by_hand: bool = False
 
+    @property
+    def path(self) -> FloatArray:
+        """Points (#P by 2 [m]) from its first to its last; the first of a closed line is both."""
+        return np.concatenate([self.points, self.points[:1]]) if self.closed else self.points
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outlines:

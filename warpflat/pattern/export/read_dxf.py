@@ -18,12 +18,11 @@ from warpflat.pattern.drafting.curves import CHORD
 from warpflat.pattern.drafting.measures import INCH
 from warpflat.pattern.drafting.outline_edges import (
     boundary_edges,
-    chain_edges,
-    find_darts,
+    named_outline,
     split_outline,
     with_drawn_allowances,
 )
-from warpflat.pattern.drafting.piece_parts import Edge
+from warpflat.pattern.drafting.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import Pattern, Piece
 from warpflat.pattern.drafting.seam_words import seams_of_words
 from warpflat.pattern.export.outlines import (
@@ -48,6 +47,8 @@ _METRES = {"METRIC": 1e-3, "ENGLISH": INCH}
 _METRES_OF_HEADER = {1: INCH, 2: 12 * INCH, 4: 1e-3, 5: 1e-2, 6: 1.0}
 # Layers of AAMA and ASTM; what is drawn on the others belongs to a piece, or checks it.
 _BOUNDARY, _FOLD, _GRAIN, _INNER, _SEWING = "1", "6", "7", "8", "14"
+# On a layer of the package's own: a pleat's legs up to its tip.
+_LEG = "16"
 # The layers of a piece that are not read, and what lies on them.
 _NOT_READ = {"4": "notch", "8": "inner line", "11": "inner cut", "13": "drill hole"}
 _LINES = ("POLYLINE", "LWPOLYLINE", "LINE", "ARC", "CIRCLE", "SPLINE", "ELLIPSE")
@@ -270,12 +271,7 @@ def _pieces(
     size, quantity = plain_label(block.value("SIZE")), read_quantity(block.value("QUANTITY").split(",")[0])
     title = plain_label(block.value("PIECE NAME") or block.name)
     # The lines beside which a name stands, with their kind, and what is sewn to them.
-    lines = [
-        (layer, line.points)
-        for layer in (_SEWING, _INNER, _FOLD)
-        for line in block.lines.get(layer, [])
-        if not line.closed
-    ]
+    lines = [(layer, line.path) for layer in (_SEWING, _INNER, _FOLD, _LEG) for line in block.lines.get(layer, [])]
     parts, sewn, last = list[tuple[str, str, FloatArray]](), list[tuple[str, str]](), ""
     # The name stands on the middle point of its line, and on no other line's.
     middles = np.array(
@@ -287,10 +283,10 @@ def _pieces(
             nearest_line = int(np.linalg.norm(middles - at, axis=1).argmin())
             middles[nearest_line] = np.inf
             layer, points = lines[nearest_line]
-            parts.append((last, {_FOLD: "fold", _INNER: "dart"}.get(layer, "seam"), points))
+            parts.append((last, {_FOLD: "fold", _INNER: "dart", _LEG: "dart"}.get(layer, "seam"), points))
         elif text.startswith("SEAM: ") and last:
             sewn.append((last, text.removeprefix("SEAM: ")))
-    tips = {text.removeprefix("DART: "): at for _, text, at in block.texts if text.startswith("DART: ")}
+    tips = {text.partition(": ")[2]: at for _, text, at in block.texts if text.startswith(("DART: ", "PLEAT: "))}
     # The legs of a dart that is cut away are on the layer of seams.
     for number, (edge, kind, points) in enumerate(parts):
         ends_at_tip = any(np.linalg.norm(points[end] - tip) < 1e-6 for tip in tips.values() for end in (0, -1))
@@ -299,31 +295,42 @@ def _pieces(
     grain = next((line.points[[0, -1]] for line in block.lines.get(_GRAIN, []) if not line.closed), None)
     if grain is not None and grain[1, 1] < grain[0, 1]:
         grain = grain[::-1]
-    found, darts = list[list[Edge]](), list[Any]()
+    found, darts, eyes, cloths = list[list[Edge]](), list[Dart](), list[Hole](), [block.value("FABRIC")]
+    inner = block.lines.get(_INNER, [])
     if parts:
-        edges = chain_edges(parts, where)
-        darts = find_darts(edges, tips, where)
-        words[size, title] = [(title, edge, text) for edge, text in sewn]
-        found = [edges]
+        # The name of a fish-eye dart stands in the middle of its points.
+        for line in (line for line in inner if line.closed):
+            names = [name for name, tip in tips.items() if np.linalg.norm(line.points.mean(axis=0) - tip) < MEET]
+            eyes += [Hole(name=name, points=line.points, kind="dart") for name in names]
+        legs = [line.points for line in inner if not line.closed]
+        cutting = [line.path for line in block.lines.get(_BOUNDARY, [])]
+        edges, darts = named_outline(parts, tips, legs, cutting, where)
+        found, cloths = [edges], cloths[0].split(" / ")
     else:
         outlines, lost = _outlines(block, where)
         notes += [f"{block.name}: {note}" for note in lost]
         found = [_edges_without_names(block, ring, allowance, where, notes) for ring in outlines]
-        for layer, what in _NOT_READ.items():
-            unread += [what] * len(block.points.get(layer, []) or block.lines.get(layer, []))
+    for layer, what in _NOT_READ.items():
+        drawn = len(block.points.get(layer, []) or block.lines.get(layer, []))
+        # The package names its inner lines.
+        named = sum(text.startswith("LINE: ") for _, text, _ in block.texts)
+        unread += [what] * (named if parts and layer == _INNER else drawn)
     pieces = list[Piece]()
     for edges in found:
         name = find_unused_name(title, {other for of, other in taken if of == size})
         taken.add((size, name))
+        words[size, name] = [(name, edge, text) for edge, text in sewn]
         pieces.append(
             Piece(
                 name=name,
                 size=size,
                 edges=edges,
                 darts=darts,
+                holes=eyes,
                 quantity=quantity,
                 grain=grain,
-                fabric=plain_label(block.value("FABRIC")),
+                fabric=plain_label(cloths[0]),
+                also={plain_label(cloth): quantity for cloth in cloths[1:]},
             )
         )
     return pieces

@@ -7,6 +7,7 @@ import os
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from xml.parsers import expat
@@ -17,13 +18,13 @@ from scipy.spatial import cKDTree
 from warpflat.core import FARTHEST, FloatArray, InputError, find_unused_name, quote_value, reading
 from warpflat.pattern.drafting.curves import CHORD, as_cubic, cubic_weights
 from warpflat.pattern.drafting.outline_edges import (
-    chain_edges,
-    find_darts,
+    named_outline,
     split_outline,
     with_drawn_allowances,
 )
+from warpflat.pattern.drafting.piece_parts import Hole
 from warpflat.pattern.drafting.pieces import Pattern, Piece
-from warpflat.pattern.drafting.polygons import mapped
+from warpflat.pattern.drafting.polygons import mapped, signed_area
 from warpflat.pattern.drafting.seam_words import seams_of_words
 from warpflat.pattern.export.outlines import (
     MEET,
@@ -45,6 +46,16 @@ _TRANSFORM = re.compile(r"(\w+)\s*\(([^)]*)\)")
 # The chords of a curve are at most so many.
 _MOST_CHORDS = 1000
 _KINDS = {"sew": "seam", "hem": "hem", "fold": "fold", "dart": "dart"}
+# What the package draws of a piece and does not read.
+_NOT_READ = {
+    "internal": "inner line",
+    "left_out": "inner line",
+    "notch": "notch",
+    "cutout": "inner cut",
+    "drill": "drill hole",
+}
+# Ends that are closer than this [m] are one.
+_ONE_POINT = 1e-6
 # Groups in each other and elements of a file, and letters of an entity, as drawing programs write for namespaces, at most.
 _DEEPEST, _MOST_ELEMENTS, _LONGEST_ENTITY = 100, 200_000, 100
 # How FreeSewing calls the group of a piece, and the classes of its outlines.
@@ -79,42 +90,10 @@ def read_svg(path: str | os.PathLike[str], *, allowance: float | None = None) ->
         drawing = _Drawing(root)
         groups = [(element, matrix) for element, matrix in drawing.walk(page) if "data-piece" in element.attrib]
         pieces, words = list[Piece](), dict[str, list[tuple[str, str, str]]]()
+        unread = list[str]()
         for group, matrix in groups:
             place.at = f"piece {quote_value(group.get('data-piece'))}"
-            name, size = group.get("data-piece", ""), group.get("data-size", "")
-            parts, grain, legs = list[tuple[str, str, FloatArray]](), None, list[FloatArray]()
-            for element in group:
-                role, edge = element.get("class", ""), element.get("data-edge", "")
-                if element.tag.rpartition("}")[2] != "path" or not edge:
-                    continue
-                lines = drawing.lines(element, _times(matrix, _transform(element.get("transform", ""))))
-                if role == "grain":
-                    grain = lines[0].points
-                elif role in _KINDS and not lines[0].closed:
-                    parts.append((edge, _KINDS[role], lines[0].points))
-                    for text in element.get("data-seam", "").split("\n"):
-                        if text.strip():
-                            words.setdefault(size, []).append((name, edge, text.strip()))
-                    if role == "dart":
-                        legs.append(lines[0].points)
-            where = f"{path}: {name}"
-            if not parts:
-                raise InputError(f"{where}: has no sewing line; a group of a piece has paths with data-edge")
-            edges = chain_edges(parts, where)
-            ends = np.array([points[k] for points in legs for k in (0, -1)]).reshape(-1, 2)
-            close = cKDTree(ends).query(ends, k=2)[0][:, 1] < 1e-6 if len(ends) else []
-            tips = {f"dart_{n}": end for n, end in enumerate(ends) if close[n]}
-            darts = find_darts(edges, tips, where)
-            pieces.append(
-                Piece(
-                    name=name,
-                    size=size,
-                    edges=edges,
-                    darts=darts,
-                    grain=None if grain is None else grain[[0, -1]],
-                    quantity=read_quantity(group.get("data-quantity", "1")),
-                )
-            )
+            pieces.append(_own_piece(drawing, group, matrix, words, unread, str(path)))
         notes = list[str]()
         if not pieces:
             pieces, notes = _freesewing_pieces(drawing, page, str(path))
@@ -129,12 +108,75 @@ def read_svg(path: str | os.PathLike[str], *, allowance: float | None = None) ->
             pieces = boundary_pieces(rings, allowance, str(path), set())
         if not pieces:
             raise InputError(f"{path}: has no closed path; a piece is a closed path")
+        if unread:
+            notes.append(f"what belongs to pieces and is not read: {counted(unread)}")
         if drawing.unread and not groups:
             notes.append(f"what is no line, or is hidden, was left out: {counted(drawing.unread)}")
         sizes = by_size(pieces)
         return Pattern(
             name=path.stem, pieces=sizes, seams=seams_of_words(words.get(next(iter(sizes)), [])), notes=notes
         )
+
+
+def _own_piece(
+    drawing: _Drawing,
+    group: ET.Element,
+    matrix: FloatArray,
+    words: dict[str, list[tuple[str, str, str]]],
+    unread: list[str],
+    path: str,
+) -> Piece:
+    """Return the piece of a group that the package wrote.
+
+    Args:
+        drawing: in which it lies.
+        group: of the piece.
+        matrix: 2 by 3, from the group to the page [m].
+        words: what is sewn to its edges is added, by size.
+        unread: kinds of what belongs to the piece but is not read are added.
+        path: what messages begin with.
+
+    Raises:
+        InputError: the outline does not close.
+    """
+    name, size, grain = group.get("data-piece", ""), group.get("data-size", ""), None
+    parts, legs, cutting = list[tuple[str, str, FloatArray]](), list[FloatArray](), list[FloatArray]()
+    for element in group:
+        role, edge = element.get("class", ""), element.get("data-edge", "")
+        if _tag(element) != "path" or not (edge or role in ("dart", "drill")):
+            continue
+        line = drawing.lines(element, _times(matrix, _transform(element.get("transform", ""))))[0]
+        if role == "grain":
+            grain = line.points[[0, -1]]
+        elif role == "cut":
+            cutting.append(line.path)
+        elif role in _KINDS and edge:
+            parts.append((edge, _KINDS[role], line.path))
+            sewn = [text.strip() for text in element.get("data-seam", "").split("\n")]
+            words.setdefault(size, []).extend((name, edge, text) for text in sewn if text)
+        elif role in _KINDS:
+            legs.append(line.points)
+        elif role in _NOT_READ and (edge or line.closed):
+            unread.append(_NOT_READ[role])
+    # A closed line is the sewing line of a hole, but where it goes around the whole piece.
+    parts = [part for part in parts if (part[2][0] != part[2][-1]).any()] or parts[:1]
+    # The sides of a fish-eye dart, one after the other, meet at both ends.
+    eyes = list[Hole]()
+    for one, other in pairwise(tuple(parts)):
+        if one[1] == other[1] == "dart" and np.abs(one[2][[0, -1]] - other[2][[0, -1]]).max() < _ONE_POINT:
+            ring = np.concatenate([one[2][:-1], other[2][:0:-1]])
+            ring = ring if signed_area(ring) > 0.0 else ring[::-1]
+            eyes.append(Hole(name=one[0].removesuffix(".left"), points=ring, kind="dart"))
+            parts = [part for part in parts if part is not one and part is not other]
+    where = f"{path}: {name}"
+    if not parts:
+        raise InputError(f"{where}: has no sewing line; a group of a piece has paths with data-edge")
+    ends = np.array([line[k] for _, kind, line in parts if kind == "dart" for k in (0, -1)]).reshape(-1, 2)
+    close = cKDTree(ends).query(ends, k=2)[0][:, 1] < _ONE_POINT if len(ends) else []
+    tips = {f"dart_{n}": end for n, end in enumerate(ends) if close[n]}
+    edges, darts = named_outline(parts, tips, legs, cutting, where)
+    quantity = read_quantity(group.get("data-quantity", "1"))
+    return Piece(name=name, size=size, edges=edges, darts=darts, holes=eyes, grain=grain, quantity=quantity)
 
 
 def _freesewing_pieces(drawing: _Drawing, page: FloatArray, where: str) -> tuple[list[Piece], list[str]]:
@@ -156,7 +198,7 @@ def _freesewing_pieces(drawing: _Drawing, page: FloatArray, where: str) -> tuple
                 if not _CLOTHS.isdisjoint(kinds) and "sa" not in kinds:
                     sewing.append(line)
                 elif "sa" in kinds:
-                    cutting.append(np.concatenate([line.points, line.points[:1]]) if line.closed else line.points)
+                    cutting.append(line.path)
                 elif "cutonfold" in marked:
                     grain = fold = line.points[[0, -1]]
                 elif "grainline" in marked:
