@@ -181,8 +181,6 @@ def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
         converged=at_rest and is_injective(state.network.surface, end),
         steps=descent.iterations,
         work_units=descent.work_units,
-        restarts=0,
-        energy_change=descent.change,
         residual=residual,
         energies=state.energies(),
         seconds=time.perf_counter() - began,

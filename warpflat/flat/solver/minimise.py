@@ -26,7 +26,7 @@ from warpflat.flat.solver.grain import align_grain
 from warpflat.flat.solver.metric import CHEAP, LaplacianFactor, Metric, Solve, StiffnessFactor
 from warpflat.flat.solver.options import RelaxOptions
 from warpflat.flat.solver.steps import Relaxation, Watch, relax_by_steps, take_first_steps
-from warpflat.flat.solver.stop import Outcome, Remainder, RemainderEstimate, Status, looked_back, relative_change
+from warpflat.flat.solver.stop import Outcome, Remainder, RemainderEstimate, Status, looked_back
 from warpflat.flat.surface.connectivity import border_of
 
 __all__ = ["Cloth", "Descent", "Measure", "Problem", "line_search", "relax"]
@@ -225,11 +225,6 @@ class Descent(Generic[P]):
         """All work, in approximate implicit steps."""
         return _WORK * self.iterations + _TRIAL_WORK * self.tried
 
-    @property
-    def change(self) -> float:
-        """Eq. (11) for the last iteration."""
-        return relative_change(*self.history[-2:]) if len(self.history) > 1 else 0.0
-
     def is_at_rest(self, options: RelaxOptions, share: float = 1.0) -> bool:
         """Return whether the last iterations have released next to nothing, and the next could release no more than a share of that."""
         return (
@@ -367,8 +362,6 @@ def relax(
             state.status = Status(
                 energies=energies,
                 residual=residual,
-                gain=state.status.energies.potential - energies.potential,
-                change=descent.change,
                 at_rest=(near and small) or descent.point.energy <= state.negligible_energy,
             )
             done |= state.status.at_rest

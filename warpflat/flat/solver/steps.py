@@ -352,8 +352,7 @@ class Relaxation:
         now, free = energies.potential, self.is_free_of_strain(energies.potential)
         change = relative_change(before, now, steps) if now > self.negligible_energy else 0.0
         at_rest = change <= self.options.energy_tolerance and residual <= self.options.residual_tolerance
-        gain = before - now if math.isfinite(before) else math.inf
-        self.status = Status(energies=energies, residual=residual, gain=gain, change=change, at_rest=at_rest or free)
+        self.status = Status(energies=energies, residual=residual, at_rest=at_rest or free)
         return self.status
 
     def make_outcome(self, steps_before: int, work_before: float, *, began_at: float) -> Outcome:
@@ -374,8 +373,6 @@ class Relaxation:
             converged=status.at_rest,
             steps=self.steps - steps_before,
             work_units=self.work_units - work_before,
-            restarts=self.restarts,
-            energy_change=status.change,
             residual=status.residual,
             energies=status.energies,
             seconds=time.perf_counter() - began_at,
@@ -414,7 +411,7 @@ def take_first_steps(state: Relaxation, *, each_step: Watch | None = None) -> Ou
         now = energies.potential + network.seam_energy(state.position)
         # Eq. (11).
         gains = now < before and relative_change(before, now, count) > options.first_steps_gain
-        change, before = relative_change(before, now, count), now
+        before = now
     state.takes_first_steps = False
     state.velocity.zero_()
     layout = state.positions() if before < first else start
@@ -431,8 +428,6 @@ def take_first_steps(state: Relaxation, *, each_step: Watch | None = None) -> Ou
         converged=True,
         steps=state.steps - steps_before,
         work_units=state.work_units - work_before,
-        restarts=state.restarts,
-        energy_change=change,
         residual=math.nan,
         energies=energies,
         seconds=time.perf_counter() - began_at,

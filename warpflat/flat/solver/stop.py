@@ -59,15 +59,11 @@ class Status:
     Attributes:
         energies: at the check.
         residual: largest force on a vertex over the mean force of the springs; infinite before the first evaluation.
-        gain: the potential energy released since the last check [J].
-        change: eq. (11), per step.
         at_rest: whether it may end.
     """
 
     energies: Energies
     residual: float = math.inf
-    gain: float = math.inf
-    change: float = math.inf
     at_rest: bool = False
 
 
@@ -153,8 +149,6 @@ class Outcome:
         converged: false if it ran into its step limit.
         steps: approximate implicit steps, or iterations of L-BFGS.
         work_units: all work, in approximate implicit steps over all vertices.
-        restarts: how often the velocities were set to zero.
-        energy_change: eq. (11) for the last step.
         residual: largest force on a vertex over the mean spring force; not a number after first steps.
         energies: at the end [J].
         seconds: wall clock.
@@ -167,8 +161,6 @@ class Outcome:
     converged: bool
     steps: int
     work_units: float
-    restarts: int
-    energy_change: float
     residual: float
     energies: Energies
     seconds: float

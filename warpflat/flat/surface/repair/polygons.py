@@ -25,6 +25,8 @@ __all__ = [
 
 # Indices of a list in a message.
 _MOST_LISTED = 8
+# As `split_quads` takes it: below it a corner is straight.
+_STRAIGHT = 1e-3
 # Entries of the table of faces, faces times the largest count of corners: a gigabyte.
 _MOST_CORNERS = 2**27
 
@@ -224,7 +226,7 @@ def split_quads(
     return faces, of, {what: origin[rows[which]] for what, which in kinds.items() if which.any()}
 
 
-def find_crossed_quads(vertices: FloatArray, faces: IntArray, tolerance: float = 1e-3) -> IndexArray:
+def find_crossed_quads(vertices: FloatArray, faces: IntArray) -> IndexArray:
     """Return the faces (of #F by 4) that are quads whose sides cross, or that are folded by more than 90 degrees."""
     quads = np.flatnonzero(faces[:, 3] >= 0)
     # All that cross are among the quads that have a corner that turns the other way, or next to no area.
@@ -233,8 +235,8 @@ def find_crossed_quads(vertices: FloatArray, faces: IntArray, tolerance: float =
     normal = cross(diagonal[:, 0], diagonal[:, 1])
     turning = dot(cross(np.roll(side, 1, axis=1), side), normal[:, None])
     longest = dot(side, side).max(axis=0) * dot(diagonal, diagonal).max(axis=0)
-    doubtful = quads[np.asarray((turning.min(axis=0) < 0.0) | (dot(normal, normal) <= tolerance**2 * longest))]
-    return doubtful[_quad_corners(vertices[faces[doubtful]], tolerance)[3]]
+    doubtful = quads[np.asarray((turning.min(axis=0) < 0.0) | (dot(normal, normal) <= _STRAIGHT**2 * longest))]
+    return doubtful[_quad_corners(vertices[faces[doubtful]], _STRAIGHT)[3]]
 
 
 def _quad_corners(p: FloatArray, tolerance: float) -> tuple[NDArray[Any], ...]:
