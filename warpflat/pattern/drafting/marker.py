@@ -194,9 +194,8 @@ def _laid_by_rule(garment: DraftedGarment, cloth: Cloth, fabric: str, sizes: Map
     from warpflat.pattern.drafting.half_pieces import halved
     from warpflat.pattern.drafting.matched_lay import Laid, lay_by_rule
 
-    garment = halved(garment) if cloth.folded else garment
     copies, once = list[Laid](), dict[tuple[str, str], int]()
-    for piece, mirrored in _copies(garment, fabric, sizes):
+    for piece, mirrored in _copies(halved(garment) if cloth.folded else garment, fabric, sizes):
         on_fold = cloth.folded and piece.piece.on_fold
         key = piece.name, piece.size
         once[key] = once.get(key, 0) + 1
@@ -210,9 +209,12 @@ def _laid_by_rule(garment: DraftedGarment, cloth: Cloth, fabric: str, sizes: Map
             linear = _onto_cloth(True)
         outline = piece.cut_line if on_fold else unfold_piece(piece)
         copies.append(Laid(piece=piece, mirrored=mirrored, linear=linear, outline=outline, at_fold=on_fold))
-    shifts = lay_by_rule(copies, cloth.lay_width, cloth.gap, cloth.stripes, garment)
+    # Nothing is kept from the fold.
+    margin = 0.5 * cloth.gap * np.array([1.0, 0.0 if cloth.folded else 1.0])
+    width = cloth.lay_width - 0.5 * cloth.gap - float(margin[1])
+    shifts = lay_by_rule(copies, width, cloth.gap, cloth.stripes, garment)
     return [
-        _placed(each.piece, each.mirrored, np.column_stack([each.linear, shift]), half=each.at_fold)
+        _placed(each.piece, each.mirrored, np.column_stack([each.linear, shift + margin]), half=each.at_fold)
         for each, shift in zip(copies, shifts, strict=True)
     ]
 

@@ -61,6 +61,8 @@ def lay_by_rule(
 ) -> list[FloatArray]:
     """Return where the drafted pieces' origins lie on cloth of a usable width [m], a gap [m] apart; the shortest of some orders.
 
+    The garment is that of whole pieces, of which copies may be halves on the fold. Half of the gap is kept to the ends and selvedges.
+
     Raises:
         InputError: a seam to be matched does not exist, or a piece is too wide.
     """
@@ -123,9 +125,16 @@ def _matched_points(
         for side in (row[0] for row in known[name].sides):
             for k, copy in enumerate(copies):
                 if copy.piece.name == side.piece:
-                    notches = [notch for notch in copy.piece.notches if notch.seam == name]
-                    line = copy.piece.edge(side.edge).line
+                    whole = next(piece for piece in garment.pieces[copy.piece.size] if piece.name == side.piece)
+                    notches = [notch for notch in whole.notches if notch.seam == name]
+                    line = whole.edge(side.edge).line
                     at = min(notches, key=lambda n: n.length).at if notches else line[-1 if side.reversed else 0]
+                    if whole is not copy.piece:
+                        # Both sides of a half lie upon each other, beside the fold along x = 0.
+                        low, high = whole.cut_line.min(axis=0), whole.cut_line.max(axis=0)
+                        half = copy.piece.cut_line
+                        away = abs(at[0] - (low[0] + high[0]) / 2) * np.sign(half[:, 0].mean())
+                        at = np.array([away, at[1] - low[1] + half[:, 1].min()])
                     joined.setdefault(k, copy.linear @ at)
         points.append(joined)
     return points
@@ -151,13 +160,15 @@ def _phases(copies: Sequence[Laid], points: Sequence[Mapping[int, FloatArray]]) 
 def _mask(copy: Laid, phase: FloatArray, cell: FloatArray, gap: float) -> tuple[Mask, FloatArray]:
     """Return the cells that a copy touches, grown by half of the gap [m], x in rows and y in columns; and where they begin in it [m].
 
-    A bound copy begins as far into its cell as its phase [m] says.
+    A bound copy begins as far into a cell as its phase [m] says.
     """
     import shapely
 
     outline = copy.outline @ copy.linear.T
     low = outline.min(axis=0)
-    into = np.where(np.isfinite(phase), np.mod(np.nan_to_num(phase) + low, cell), 0.5 * gap)
+    bound = np.mod(np.nan_to_num(phase) + low, cell)
+    bound += cell * np.maximum(0.0, np.ceil((0.5 * gap - bound) / cell - 1e-9))
+    into = np.where(np.isfinite(phase), bound, 0.5 * gap)
     if copy.at_fold:
         into[1] = 0.0
     grown = shapely.Polygon(outline - low + into).buffer(0.5 * gap)

@@ -477,4 +477,12 @@ def _marker(
             f"marker{of}: {marker.length:.2f} m of cloth {wide}, {marker.utilisation:.1%} of it "
             f"used by {format_count(len(placements), 'piece')}"
         )
+        spare = [
+            copy.piece.name
+            for copy in marker.placements
+            if marker.folded and not copy.piece.piece.on_fold
+            if cloths_of(copy.piece)[fabric] * (1 if sizes is None else sizes[copy.piece.size]) % 2
+        ]
+        if spare:
+            remarks.append(f"marker{of}: the cloth lies double: {', '.join(dict.fromkeys(spare))} cut once too often")
     return names, tuple(remarks), plans
