@@ -32,7 +32,7 @@ frames = 4
 """
 # What is made to fail, by the file that goes missing: all that goes into a function, from the first line on.
 SURFACE = {
-    "picture.png": "warpflat.pattern.export.picture._draw",
+    "picture.png": "warpflat.pattern.export.picture.draw_figure",
     "dome.wear.png": "warpflat.pattern.export.fit_picture.write_wear_sheet",
     "frames.usdc": "warpflat.pattern.export.usd.FrameWriter.__enter__",
     "review.html": "warpflat.app.review.page._page",
@@ -218,7 +218,7 @@ def test_a_batch_goes_on_without_its_pictures(
     monkeypatch.setattr("warpflat.app.batch.run.bodies_table", lambda _: "key\n")
     Path("dome.toml").write_text(DOME)
     Path("all.toml").write_text("scenes = ['dome.toml']\nfabrics = ['denim', 'jersey']\n")
-    drawn = ["warpflat.pattern.export.picture._draw", "warpflat.app.batch.body_picture.write_body_picture"]
+    drawn = ["warpflat.pattern.export.picture.draw_figure", "warpflat.app.batch.body_picture.write_body_picture"]
     fail(monkeypatch, drawn, RuntimeError)
     assert main(["batch", "all.toml", "--out", "out"]) == 0
     told = capfd.readouterr().err
@@ -245,7 +245,7 @@ def test_a_signal_while_a_picture_is_drawn_ends_the_run(
         raise RuntimeError("what a library says of it")
 
     monkeypatch.setenv("WARPFLAT_THREADS", "1")
-    monkeypatch.setattr("warpflat.pattern.export.picture._draw", draw)
+    monkeypatch.setattr("warpflat.pattern.export.picture.draw_figure", draw)
     Path("dome.toml").write_text(DOME)
     assert main(["run", "dome.toml", "--out", "out", "-q"]) == code
     assert not Path("out").exists()
@@ -263,7 +263,7 @@ def test_what_the_user_must_see_to_still_ends_the_run(
     def short(*_: object, **__: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr("warpflat.pattern.export.picture._draw", short)
+    monkeypatch.setattr("warpflat.pattern.export.picture.draw_figure", short)
     assert main(["run", "dome.toml", "--out", "out", "-q"]) == 2
     assert "not enough memory" in capfd.readouterr().err
     assert not list(Path("out").iterdir())

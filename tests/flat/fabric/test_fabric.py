@@ -380,3 +380,33 @@ def test_what_is_no_name_and_no_list_of_files_is_told():
             load_library(wrong)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="a path in extra_files is of type int"):
         load_library([3])  # type: ignore[list-item]
+
+
+def test_secants_that_begin_above_zero_begin_with_their_first(tmp_path: Path):
+    file = '[a]\nbase = "woven"\ncurve_warp = { secants = [[0.05, 1000], [0.10, 3000]], unit = "N/m" }\n'
+    assert load_library([write(tmp_path, file)])["a"].tension(0.05) == pytest.approx(50.0)
+
+
+def test_a_limit_that_was_estimated_is_estimated_anew_for_another_kind_of_cloth(tmp_path: Path):
+    file = '[a]\nbase = "isotropic"\nshear_stiffness = 30\n[b]\nbase = "a"\nstrain_limit = 0.3\n'
+    library = load_library([write(tmp_path, file)])
+    assert library["a"].shear_limit == cloth().shear_limit == 15.0
+    assert library["b"].shear_limit == cloth(strain_limit=0.3).shear_limit
+
+
+def test_a_stiffness_of_the_table_is_not_overruled_by_a_curve_of_readings(tmp_path: Path):
+    readings = "emt_warp = 5\nemt_weft = 5\nlt_warp = 0.6\nlt_weft = 0.6\ng = 1\nw = 15\n"
+    file = f"[a]\nstiffness_warp = 20000\n[a.kes]\n{readings}"
+    found = load_library([write(tmp_path, file)])["a"]
+    assert found.tension(0.05) == pytest.approx(1000.0)
+    assert found.curve_weft
+
+
+def test_a_sheet_with_a_curve_along_one_thread_is_not_isotropic():
+    curved = cloth(stiffness_warp=1000.0, stiffness_weft=1000.0, shear_stiffness=500.0, poisson_ratio=0.0)
+    assert curved.is_isotropic
+    assert not replace(curved, curve_warp=[(0.1, 20.0), (0.2, 400.0)]).is_isotropic
+
+
+def test_curves_given_as_lists_are_values_like_any_others():
+    assert hash(cloth(curve_warp=[[0.1, 100.0]])) == hash(cloth(curve_warp=((0.1, 100.0),)))

@@ -71,6 +71,23 @@ def test_tension_is_per_width_of_the_cloth_as_worn():
     np.testing.assert_allclose(result.fit.pressure, expected / RADIUS, rtol=0.01)
 
 
+def test_the_pressure_of_sheared_and_stretched_cloth_is_that_of_its_stress():
+    """Cauchy's stress around the cylinder over its radius, by sigma = P F^T / J."""
+    net = warpflat.Fabric(
+        name="net", stiffness_warp=1000.0, stiffness_weft=800.0, shear_stiffness=100.0, areal_density=0.1, strain_limit=0.5
+    )  # fmt: skip
+    flat = warpflat.flatten(sleeve(), fabric=net, datum="centre", device=DEVICE).positions
+    worn = np.array([[1.2, 0.08], [0.0, 1.3]])
+    fit = assess_pattern(sleeve(), net, flat @ np.linalg.inv(worn).T)
+    weft, warp = worn.T
+    long_weft, long_warp = np.linalg.norm(weft), np.linalg.norm(warp)
+    around = (
+        800.0 * (long_weft - 1.0) * weft[0] ** 2 / long_weft + 1000.0 * (long_warp - 1.0) * warp[0] ** 2 / long_warp
+    )
+    around += 2.0 * 100.0 * (weft @ warp) * weft[0] * warp[0]
+    np.testing.assert_allclose(fit.pressure, around / np.linalg.det(worn) / RADIUS, rtol=0.01)
+
+
 def test_a_pressure_is_reached_beside_a_stretch_of_the_other_threads():
     wear = Wear(pressure=800.0, stretch_warp=0.1)
     result = warpflat.flatten(sleeve(), fabric=NET, datum="centre", wear=wear, device=DEVICE)

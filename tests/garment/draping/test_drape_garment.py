@@ -20,10 +20,16 @@ from warpflat.app.scene.drape import drape_scene
 from warpflat.app.scene.load import load_scene
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
+from warpflat.flat.fabric.fabric import grain_axes
+from warpflat.flat.fabric.library import find_fabric, load_library
+from warpflat.flat.model.membrane import make_cloth
 from warpflat.flat.surface.connectivity import border_loops
 from warpflat.garment.draping.body import Body
+from warpflat.garment.draping.drape_energy import DrapeEnergy
 from warpflat.garment.draping.drape_garment import thread_elastics
 from warpflat.garment.draping.frames import choose_frames, write_drape_frames
+from warpflat.garment.draping.moved_pattern import with_pattern
+from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.places import Place, find_places
 from warpflat.garment.draping.result import HOLLOW_REACH, hollow_depths
 from warpflat.garment.draping.sewn_cloth import SewnCloth, sew_cloth
@@ -369,6 +375,29 @@ def test_cloth_sheared_beyond_its_limit_does_not_fit(worn: warpflat.Drape):
             assert (
                 f"is sheared by {1.1 * limit:.1f} degrees, beyond the cloth's limit of {limit:g} degrees" in place.words
             )
+
+
+def test_a_pattern_in_another_cloth_is_judged_by_that_cloth(bodice: warpflat.Garment, worn: warpflat.Drape):
+    silk = next(cloth for cloth in load_library().values() if cloth.name != "woven" and not cloth.is_knit)
+    changed = with_pattern(bodice, dataclasses.replace(worn.cloth, fabric=silk))
+    for piece in changed.pieces.values():
+        assert piece.network.fabric is piece.fabric is silk
+        assert piece.fit.demand.fabric in (silk, silk.name)
+
+
+def test_a_sheet_without_threads_has_none_that_lock():
+    paper, woven = find_fabric("isotropic"), find_fabric("woven")
+    assert [make_cloth(cloth, grain_axes(0.0), "cpu").lock for cloth in (paper, woven)] == [
+        0.0,
+        10.0 * woven.shear_stiffness,
+    ]
+
+
+def test_beyond_the_bound_of_a_round_no_force_is_as_good_as_none(worn: warpflat.Drape):
+    energy = DrapeEnergy(worn.cloth, None, DrapeOptions(), np.zeros(len(worn.cloth.designed), bool))
+    energy.bound(worn.cloth.designed, 0.1)
+    assert np.isfinite(energy.mean_force(energy.at(worn.cloth.designed)))
+    assert energy.mean_force(energy.at(worn.cloth.designed + 0.11)) == np.inf
 
 
 def test_what_an_elastic_gathers_is_told_and_no_strain(bodice: warpflat.Garment, worn: warpflat.Drape):

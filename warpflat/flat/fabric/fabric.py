@@ -17,6 +17,7 @@ __all__ = [
     "DEFAULT_FABRIC",
     "GRADES",
     "SHEAR_BY_STRAIN",
+    "SHEAR_OF_WOVENS",
     "Curve",
     "Fabric",
     "Provenance",
@@ -88,7 +89,8 @@ class Provenance:
         return self.grade == "E"
 
 
-#: Of the limit of shear that nobody gave of a knit or an isotropic sheet.
+#: Of the limit of shear that nobody gave: of a woven, and of a knit or an isotropic sheet.
+SHEAR_OF_WOVENS = Provenance(source="estimate for wovens", grade="E", unit="degrees", test_load="none")
 SHEAR_BY_STRAIN = Provenance(
     source="estimate: the shear that lengthens the bias by strain_limit", grade="E", unit="degrees", test_load="none"
 )
@@ -144,12 +146,14 @@ class Fabric:
     provenance: Mapping[str, Provenance] = field(default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self) -> None:
+        for key in ("curve_warp", "curve_weft"):
+            object.__setattr__(self, key, tuple(map(tuple, getattr(self, key))))
         estimated = self.shear_limit is None
         if estimated:
             object.__setattr__(self, "shear_limit", _WOVEN_SHEAR)
         self.validate()
         if estimated:
-            origin = Provenance(source="estimate for wovens", grade="E", unit="degrees", test_load="none")
+            origin = SHEAR_OF_WOVENS
             if self.is_knit or self.is_isotropic:
                 # Threads that keep their lengths and cross at 90 degrees less g lengthen the bias to sqrt(1 + sin g).
                 limit = math.degrees(math.asin(min((1.0 + self.strain_limit) ** 2 - 1.0, 1.0)))
@@ -223,7 +227,7 @@ class Fabric:
         """True if stiffness is the same in all directions within 0.1 %, as values are given with three or four digits."""
         same = math.isclose(self.stiffness_warp, self.stiffness_weft, rel_tol=1e-3)
         sheared = self.stiffness_warp / (2.0 * (1.0 + self.poisson_ratio))
-        return same and math.isclose(self.shear_stiffness, sheared, rel_tol=1e-3)
+        return same and math.isclose(self.shear_stiffness, sheared, rel_tol=1e-3) and self.curve_warp == self.curve_weft
 
     def tension(self, strain: ArrayLike, direction: Literal["warp", "weft"] = "warp") -> FloatArray:
         """Return tension at given strains along one direction, by the curve where there is one.

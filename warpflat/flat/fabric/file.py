@@ -16,7 +16,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.toml_file import Table, check_table, read_toml
-from warpflat.flat.fabric.fabric import SHEAR_BY_STRAIN, Curve, Fabric, Provenance, fabric_called
+from warpflat.flat.fabric.fabric import SHEAR_BY_STRAIN, SHEAR_OF_WOVENS, Curve, Fabric, Provenance, fabric_called
 from warpflat.flat.fabric.instruments import (
     FAST_LOADS,
     GF_PER_CM,
@@ -93,6 +93,9 @@ class CurveTable(_Origin):
     def tensions(self, factor: float) -> Curve:
         """Return its points with tensions in N/m, by the factor of its unit; secants change evenly from strain to strain."""
         found = [(strain, tension * factor) for strain, tension in self.points or ()]
+        if self.secants and self.secants[0][0] > 0.0:
+            e0, k0 = self.secants[0]
+            found.append((e0, k0 * factor * e0))
         for (e0, k0), (e1, k1) in itertools.pairwise(self.secants or []):
             slope = (k1 - k0) / (e1 - e0)
             first, last = np.maximum([k0 + slope * e0, k1 + slope * e1], _FLATTEST * max(k0, k1))
@@ -305,13 +308,16 @@ def fabric_from_table(
             if curve is not None:
                 factor = _factor(name, key, curve.unit, _TENSILE)
                 given[key] = curve.tensions(factor), _provenance(curve, curve.unit, sources or {})
+            elif getattr(table, key.replace("curve", "stiffness")) is not None:
+                # A curve of readings would contradict the table's own stiffness.
+                given.pop(key, None)
         # A curve of the base would contradict a stiffness that is given here.
         for direction in ("warp", "weft"):
             if f"stiffness_{direction}" in given:
                 values.pop(f"curve_{direction}", None)
                 origins.pop(f"curve_{direction}", None)
-        # So would a limit of shear that goes by the base's limit of strain.
-        if "strain_limit" in given and origins.get("shear_limit") == SHEAR_BY_STRAIN:
+        # So might an estimate of its limit of shear: it is estimated anew.
+        if origins.get("shear_limit") in (SHEAR_BY_STRAIN, SHEAR_OF_WOVENS):
             del values["shear_limit"], origins["shear_limit"]
         values.update((key, value) for key, (value, _) in given.items())
         origins.update((key, origin) for key, (_, origin) in given.items())

@@ -121,7 +121,7 @@ class _Piece:
         state.check_convergence(1.0)
         task.stopped = True
         task.notes.append("the callback stopped the relaxation before it was at rest")
-        return state.make_outcome(0, 0.0, began_at=started)
+        return replace(state.make_outcome(0, 0.0, began_at=started), converged=False)
 
     def _update_directions(self) -> float:
         """Relax the piece roughly and measure directions there; return how far it has moved on average, as a share of its size."""

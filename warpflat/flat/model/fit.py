@@ -226,7 +226,8 @@ def assess_fit(network: SpringNetwork, positions: FloatArray) -> WornFit:
     # sigma = P F^T / J: force per worn width, and per worn area times curvature.
     spread = np.maximum(np.sqrt(np.maximum((lengths[:, 0] * lengths[:, 1]) ** 2 - strain[:, 2] ** 2, 0.0)), 1e-12)
     pull = stress[:, :2] * lengths / spread[:, None]
-    load = pull[:, 0] * along_warp + pull[:, 1] * along_weft + 2.0 * stress[:, 2] * crossed / spread
+    sheared = 2.0 * stress[:, 2] * lengths.prod(axis=1) / spread
+    load = pull[:, 0] * along_warp + pull[:, 1] * along_weft + sheared * crossed
 
     face, faces = network.cell_arrays.face, len(surface.faces)
     face_area = np.bincount(face, area, minlength=faces).astype(np.float64)

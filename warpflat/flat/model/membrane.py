@@ -103,7 +103,7 @@ def make_cloth(
     cloth.shear = fabric.shear_stiffness
     cloth.k_warp, cloth.k_weft = fabric.stiffness_warp, fabric.stiffness_weft
     cloth.onset = float(np.sin(np.radians(fabric.shear_limit)))
-    cloth.lock = 0.0 if linear else _LOCKING * fabric.shear_stiffness
+    cloth.lock = 0.0 if linear or fabric.is_isotropic else _LOCKING * fabric.shear_stiffness
     cloth.compression = 1.0 if linear else fabric.compression_factor
     for direction in ("warp", "weft"):
         points: Curve = getattr(fabric, f"curve_{direction}") if curves and not linear else ()

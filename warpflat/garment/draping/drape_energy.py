@@ -188,7 +188,9 @@ class DrapeEnergy:
         return Point(positions=positions, energy=energy, gradient=-self._force.numpy())
 
     def mean_force(self, point: Point) -> float:
-        """Return the mean force that is left at a vertex, over its mean weight."""
+        """Return the mean force that is left at a vertex, over its mean weight; infinite beyond the bound."""
+        if not np.isfinite(point.energy):
+            return np.inf
         return float(np.linalg.norm(point.gradient, axis=1).mean() / self.weight.mean())
 
     def factor(self, positions: FloatArray, *, near: bool) -> None:

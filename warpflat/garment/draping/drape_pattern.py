@@ -121,6 +121,8 @@ def drape_pattern(
         raise InputError(
             f"pattern {pattern.name!r} has no seams; name them in a file of [[seams]] and give --seams FILE"
         )
+    if not pieces:
+        raise InputError(f"pattern {pattern.name!r}: nothing of it is draped: {'; '.join(layers)}")
     # A garment of an impossible size comes from a file whose units are wrong.
     sizes = {name: np.ptp(piece.outline, axis=0) for name, piece in pieces.items()}
     name = max(sizes, key=lambda each: float(sizes[each].max()))

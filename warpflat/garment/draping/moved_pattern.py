@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 
 from warpflat.core import FloatArray, IntArray, reflected, turned_left, unit
-from warpflat.flat import Flattening, corner_triangles
+from warpflat.flat import Flattening, SpringNetwork, corner_triangles
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.draping.lift import Lift, surface_lift
 from warpflat.garment.draping.sewn_cloth import SewnCloth, pieces_of
@@ -137,8 +137,14 @@ def moved_outlines(pattern: Pattern, size: str, before: SewnCloth, after: SewnCl
 
 def with_pattern(garment: Garment | Flattening, cloth: SewnCloth) -> Garment | Flattening:
     """Return the garment, or the piece, with the flat pieces of sewn cloth, and in that cloth's fabric."""
-    pieces = {
-        name: replace(piece, positions=cloth.flat[cloth.piece_vertices[name]], fabric=cloth.fabric)
-        for name, piece in pieces_of(garment).items()
-    }
+    pieces = {}
+    for name, piece in pieces_of(garment).items():
+        flat, network = cloth.flat[cloth.piece_vertices[name]], piece.network
+        if cloth.fabric is not piece.fabric:
+            # What is measured of the piece is measured in its cloth.
+            network = SpringNetwork.build(
+                network.surface, cloth.fabric, flat, grain_angle=piece.grain_angle, device=network.device,
+                model="membrane" if network.model == "membrane" else None, stretch=network.stretch,
+            )  # fmt: skip
+        pieces[name] = replace(piece, positions=flat, fabric=cloth.fabric, network=network)
     return replace(garment, pieces=pieces) if isinstance(garment, Garment) else next(iter(pieces.values()))
