@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from polygons import corners_of, drafted, polygon, sewn
 
+from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import Pattern, Piece
@@ -42,6 +43,17 @@ def through(garment: DraftedGarment, ending: str, folder: Path) -> Pattern:
 def test_a_dart_of_pattern_json_is_still_cut_away():
     read = pattern_from_json(pattern_json(darted(cut=True)))
     assert read.pieces[""][0].piece.darts[0].cut
+
+
+def test_pattern_json_keeps_how_seams_are_sewn_and_notched_and_the_notes():
+    fronts = [polygon(f"front_{k}", corners_of(0.2, 0.3)) for k in (1, 2)]
+    seam = sewn(
+        "front_1.e1", "front_2.e3", "cf", as_laid=True, double=True, notches=(0.25, 0.5), size_notches={"": (0.3,)}
+    )
+    given = Pattern(name="p", pieces={"": fronts}, seams=[seam], notes=["the file says so"])
+    read = pattern_from_json(pattern_json(draft_garment(given))).garment
+    assert read.seams == [seam]
+    assert list(read.notes) == given.notes
 
 
 @BOTH

@@ -95,6 +95,7 @@ Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
 Shares = Annotated[
     list[Annotated[float, Field(ge=0.0, le=1.0)]], Field(min_length=2, max_length=2), AfterValidator(_ascending)
 ]
+Share = Annotated[float, Field(gt=0.0, lt=1.0)]
 Ends = Annotated[list[Point], Field(min_length=2, max_length=2)]
 Line = Annotated[list[Point], Field(min_length=2)]
 Ring = Annotated[list[Point], Field(min_length=3), AfterValidator(_ring)]
@@ -248,6 +249,10 @@ class StitchEntry(Entry):
     kind: Literal["seam", "dart"]
     ease: float
     eased: Shares = Field(default=[0.0, 1.0])
+    as_laid: bool = False
+    notches: list[Share] | None = None
+    size_notches: dict[Text, list[Share]] = Field(default_factory=dict)
+    double: bool | None = None
     openings: list[OpeningEntry] = Field(default_factory=list)
     sides: Annotated[list[Annotated[list[SideEntry], Field(min_length=1)]], Field(min_length=2, max_length=2)]
 
@@ -342,6 +347,7 @@ class PatternEntry(Entry):
     elastics: list[ElasticEntry] = Field(default_factory=list)
     worn: WornEntry | None = None
     found_seams: list[PriceEntry] = Field(default_factory=list)
+    notes: list[Text] = Field(default_factory=list)
 
 
 #: Increased when a reader of the old form would misread the new one.
@@ -368,12 +374,13 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
         "sizes": {size: {piece.name: _piece(piece) for piece in pieces} for size, pieces in garment.pieces.items()},
         "cut_list": {size: _plain(cut_list(pieces)) for size, pieces in garment.pieces.items()},
         "stitches": [
-            *({**_stitch(seam, "seam"), "openings": _plain(seam.openings)} for seam in pattern.seams),
+            *(_stitch(seam, "seam") for seam in pattern.seams),
             *(_stitch(dart, "dart") for dart in darts),
         ],
         "elastics": _plain(pattern.elastics),
         "worn": _plain(pattern.worn),
         "found_seams": [seam.as_dict() for seam in pattern.found_seams],
+        "notes": list(pattern.notes),
         "seams": [_told(ReportEntry, report, matches=report.matches) for report in garment.seams],
     }
 
@@ -406,7 +413,7 @@ def _stitch(seam: Seam, kind: str) -> dict[str, Any]:
     sides = [
         [_told(SideEntry, side, **({"copy": side.copy} if side.copy else {})) for side in row] for row in seam.sides
     ]
-    return {"name": seam.name, "kind": kind, "ease": seam.ease, "eased": list(seam.eased), "sides": sides}
+    return _told(StitchEntry, seam, kind=kind, sides=sides)
 
 
 def _piece(piece: DraftedPiece) -> dict[str, Any]:
