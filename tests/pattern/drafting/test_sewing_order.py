@@ -156,6 +156,32 @@ def test_a_zip_above_a_vent_is_closed_down_to_the_vent():
         SeamOpening(kind="zipp", length=0.1)
 
 
+def test_a_zip_through_two_seams_is_one_zip():
+    """Of a bodice and a skirt; one of its length elsewhere, that begins above a band, is another one."""
+    names = ("hem", "centre back", "top", "side")
+    halves = [
+        polygon(f"{part}_{half}", corners_of(0.2, 0.3), names=names if half == "left" else ("hem", "side", "top", "centre back"))
+        for part in ("bodice", "skirt")
+        for half in ("left", "right")
+    ]  # fmt: skip
+    upper = SeamOpening(kind="zip", length=0.4, whole=True, style="invisible")
+    openings = {"bodice": upper, "skirt": replace(upper, begin=-0.3, whole=False)}
+    seams = [
+        sewn(f"{part}_left.centre back", f"{part}_right.centre back", openings=(opening,))
+        for part, opening in openings.items()
+    ]
+    waists = [sewn(f"bodice_{half}.hem", f"skirt_{half}.top") for half in ("left", "right")]
+    steps = sewing_steps(draft_garment(Pattern(name="t", pieces={"": halves}, seams=[*seams, *waists])), "")
+    assert notions(steps) == ("sewing thread", "1 invisible zip of 40 cm")
+    first, second = [step.words for step in steps if "Sew the invisible zip" in step.words]
+    assert "all along" in first
+    assert "on from the seam above" not in first
+    assert "on from the seam above, down to the end of its line" in second
+    alone = [replace(seam, openings=(replace(seam.openings[0], begin=-0.05, whole=False),)) for seam in seams[:1]]
+    steps = sewing_steps(draft_garment(Pattern(name="t", pieces={"": halves}, seams=[*alone, *waists])), "")
+    assert notions(steps) == ("sewing thread", "1 invisible zip of 40 cm")
+
+
 def test_a_band_that_is_shorter_than_its_edge_is_stretched():
     band = FinishingTable(kind="band", edge="neck", width_mm=20, share=0.85)
     (step,) = [

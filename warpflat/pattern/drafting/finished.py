@@ -40,7 +40,8 @@ def finished_lengths(garment: DraftedGarment, size: str) -> dict[str, float]:
         lengths: dict[str, float] = {}
         ends, beside = False, set[str]()
         for piece in pieces:
-            stretches = [edge.line for edge in piece.edges if line_name(edge.name) == line]
+            parts = (line, *(f"{line} {opened}" for opened in ("vent", "slit", "godet")))
+            stretches = [edge.line for edge in piece.edges if line_name(edge.name) in parts]
             within = [(line_name(name), points) for name, points in piece.internal_lines.items()]
             # Inside a piece the line of a leg is another one above the hip.
             above = [points[::-1] for name, points in within if line == "outseam" and name == "side"]

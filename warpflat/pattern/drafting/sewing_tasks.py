@@ -414,6 +414,11 @@ class SewingTasks:
     def _close(self, drafted: Sequence[DraftedPiece]) -> None:
         """Add what closes the garment, with its notions: zips, buttons, hooks."""
         zipped = False
+        # Zips that run on beyond the lower end of their seam.
+        running = {
+            (each.style, each.length): each.begin
+            for task in self.tasks for seam in task.seams for each in seam.openings if each.kind == "zip" and each.whole
+        }  # fmt: skip
         for task in self.tasks:
             found = [opening for seam in task.seams for opening in seam.openings if opening.kind == "zip"]
             if not found or not task.technique.endswith(("_zip", "fly")):
@@ -422,17 +427,20 @@ class SewingTasks:
             length = length_words(opening.length, self.units)
             count = len(task.seams)
             words = f"{{count}} {opening.style} {'zip' if count == 1 else 'zips'} of {{length}}"
-            task.notions.append(translate(words, count=count, length=length))
-            where = "from the upper edge down to the end of its line"
-            if opening.begin > 0.0:
+            above = running.get((opening.style, opening.length))
+            runs_on = above is not None and opening.begin < min(0.0, above)
+            if not runs_on:
+                task.notions.append(translate(words, count=count, length=length))
+            where = "all along" if opening.whole else "from the upper edge down to the end of its line"
+            if runs_on:
+                where = f"on from the seam above, {'all along' if opening.whole else 'down to the end of its line'}"
+            elif opening.begin > 0.0 and not opening.whole:
                 where = "from {begin} below the upper edge down to the end of its line"
             below = [each.kind for each in task.seams[0].openings if each.kind in ("slit", "vent")]
             closed = f"Then close the seam below it{', down to the ' + below[0] if below else ''}."
             task.values = {
                 "length": length,
-                "where": translate(
-                    "all along" if opening.whole else where, begin=length_words(opening.begin, self.units)
-                ),
+                "where": translate(where, begin=length_words(opening.begin, self.units)),
                 "below": "" if opening.whole else translate(closed),
                 "front": translate(f"{self.above} front"),
             }
