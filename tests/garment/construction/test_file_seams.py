@@ -182,6 +182,13 @@ def test_the_texture_can_be_left_alone(tmp_path: Path) -> None:
     assert {seam.name for seam in result.seams} >= {"side left", "side right"}
 
 
+def test_seams_that_are_left_out_of_a_file_are_told_to_be_its_own(tmp_path: Path) -> None:
+    path = write_obj(tmp_path / "skirt.obj")
+    for find, other in (("auto", "--no uv"), ("uv", "--seams auto")):
+        (note,) = [note for note in found(path, find=find, no=["shoulder"]).notes if "shoulder" in note]
+        assert note == f"no = 'shoulder' had no effect: the file's own seams were taken; {other} looks for others"
+
+
 def test_islands_that_are_no_pattern_are_taken_only_when_asked(tmp_path: Path) -> None:
     # A ball in two halves, in a texture that keeps their area: as large as cut pieces, and far from flat.
     ball = trimesh.creation.icosphere(4, radius=0.15)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -108,7 +109,7 @@ def new(
         temporary.write_text(text, encoding="utf-8")
     click.echo(f"wrote {file}: {offer.about}")
     _print_choices(offer, taken)
-    click.echo(f"make its pattern with: warpflat run {file}")
+    click.echo(f"make its pattern with: warpflat run {shlex.quote(str(file))}")
     return DONE
 
 

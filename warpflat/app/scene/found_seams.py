@@ -141,6 +141,11 @@ def found_seams(scene: Scene) -> FoundSeams | None:
             found = find_seams(layers, options, fabric=fabric)
     if taken is not None:
         why = "islands of the texture were taken, as they look like cut pieces; --no uv leaves them, --seams none keeps it whole"
+        if left := [name for name in asked.no if name != _TEXTURE]:
+            other = "--seams auto" if of_file else "--no uv"
+            notes.append(
+                f"no = {', '.join(map(repr, left))} had no effect: the file's own seams were taken; {other} looks for others"
+            )
         found = _named_by_file(found, taken, read)
         return replace(found, notes=(*(() if of_file else (why,)), *notes, *found.notes))
     if not by_itself:
