@@ -31,6 +31,7 @@ from warpflat.pattern.drafting.fitting import (
     equal_sides,
     fit_edges,
     is_wavy,
+    lengths_along,
     smooth_line,
     uncrossed,
 )
@@ -293,11 +294,8 @@ def _drafted_edge(edge: Edge, curve: Curve, fitted: tuple[Curve, float], points:
     import shapely
 
     line, marks = curve.sample(), shapely.points(points)
-    drawn = shapely.LineString(line)
-    # Places rise along the line: where a border nearly touches itself, the nearest place may be on its other part.
-    places = np.maximum.accumulate(shapely.line_locate_point(drawn, marks))
-    places[[0, -1]] = 0.0, drawn.length
-    untrued = drawn if curve is fitted[0] else shapely.LineString(fitted[0].sample())
+    places = lengths_along(curve, points)
+    untrued = shapely.LineString(line if curve is fitted[0] else fitted[0].sample())
     fit_error = float(shapely.distance(untrued, marks).max())
     return DraftedEdge(
         edge=edge, curve=curve, line=line, width=edge.width, places=places, fit_error=fit_error, tolerance=fitted[1]

@@ -31,6 +31,7 @@ __all__ = [
     "equal_sides",
     "fit_edges",
     "is_wavy",
+    "lengths_along",
     "smooth_line",
     "uncrossed",
 ]
@@ -113,7 +114,7 @@ def fit_edges(
                 found, used = [fit_curve(side) for side in sides], TOLERANCES[-1]
                 for width in TOLERANCES[1:]:
                     reached = [
-                        _lengths_along(fit_curve(side, width), side) / share
+                        lengths_along(fit_curve(side, width), side) / share
                         for side, share in zip(sides, longer, strict=True)
                     ]
                     lengths = min(reached, key=lambda places: float(places[-1]))
@@ -412,7 +413,7 @@ def _along_sides(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the lengths along both sides of a seam at their points [m], joints once."""
     first, second = (
-        lengths_along_side((_lengths_along(curves[part.place][0], lines[part.place]), part.reversed) for part in side)
+        lengths_along_side((lengths_along(curves[part.place][0], lines[part.place]), part.reversed) for part in side)
         for side in seam.sides
     )
     return first, second
@@ -431,11 +432,12 @@ def _differences(
     return float(whole), 0.0 if near is None else near / LOCAL_TOLERANCE
 
 
-def _lengths_along(curve: Curve, points: FloatArray) -> FloatArray:
+def lengths_along(curve: Curve, points: FloatArray) -> FloatArray:
     """Return the length [m] along the curve at each of the points (#P)."""
     import shapely
 
     line = shapely.LineString(curve.sample())
+    # Places rise along the line: where a border nearly touches itself, the nearest place may be on its other part.
     places = np.maximum.accumulate(shapely.line_locate_point(line, shapely.points(points)))
     places[[0, -1]] = 0.0, line.length
     return np.asarray(places)

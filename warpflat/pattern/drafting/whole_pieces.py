@@ -47,9 +47,7 @@ def whole_pieces(
     }
     # A cuff is sewn to each of two sleeves, whether it is cut turned over or not.
     pairs = [{side.piece for side in seam.stretches} for seam in seams]
-    flagged = {
-        side.piece for seam in seams if any(s.mirrored for c in seam.sides for s in c) for c in seam.sides for side in c
-    }
+    flagged = {side.piece for seam in seams if any(each.mirrored for each in seam.stretches) for side in seam.stretches}
     for name in [each for each in given if each not in halves | twice | flagged]:
         others = set().union(*(pair for pair in pairs if name in pair)) - {name}
         if given[name].quantity % 2 == 0 and others and others <= twice:
