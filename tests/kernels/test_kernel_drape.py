@@ -122,12 +122,15 @@ def test_moments_are_the_laplacian_times_the_stiffness():
     np.testing.assert_allclose(moment.numpy(), stiffness[:, None] * (weights @ x), rtol=1e-12)
 
 
-def advance(force: np.ndarray, velocity: np.ndarray, *, height: float = 0.0, fixed: int = 0, halted: int = 0) -> dict:
-    """One vertex of weight 2 N and mass 8 N/m above the level plane y = 0, friction 0.5."""
+def advance(
+    force: np.ndarray, velocity: np.ndarray, *, height: float = 0.0, fixed: int = 0, halted: int = 0, ball: float = 0.0
+) -> dict:
+    """One vertex of weight 2 N and mass 8 N/m above the level plane y = 0, or in a ball that touches it from above; friction 0.5."""
     motion, contact = Motion(), Contact()
     motion.position, motion.velocity = on([[0.0, height, 0.0]], wp.vec3d), on([velocity], wp.vec3d)
     motion.mass, motion.weight, motion.fixed = on([8.0], wp.float64), on([2.0], wp.float64), on([fixed], wp.int8)
     contact.centre, contact.normal = on([[0.0, 0.0, 0.0]], wp.vec3d), on([[0.0, 1.0, 0.0]], wp.vec3d)
+    contact.ball = on([ball], wp.float64)
     contact.friction, contact.longest_step = 0.5, 1.0
     outputs = [wp.zeros(1, dtype=wp.float64, device=DEVICE) for _ in range(3)]
     lists = [on([0, 2], wp.int32), on([1, 0], wp.int32), on([0.25 * force, 1.75 * force], wp.vec3d)]
@@ -171,13 +174,20 @@ def test_no_vertex_is_left_inside_the_body_and_a_fixed_one_stays():
     np.testing.assert_array_equal(advance(np.ones(3), np.ones(3), height=0.2, fixed=1)["x"], [0.0, 0.2, 0.0])
 
 
+def test_a_vertex_that_crosses_a_groove_stays_in_the_ball_between_its_sides():
+    for way in ([1.0, -50.0, 0.0], [50.0, 0.0, 0.0], [0.0, 10.0, 0.0]):
+        moved = advance(np.array(way), STILL, height=0.1, ball=0.2)
+        away = np.linalg.norm(moved["x"] - [0.0, 0.2, 0.0])
+        assert away == pytest.approx(0.2)
+
+
 def test_friction_holds_up_to_its_share_of_what_presses():
     """Two vertices on the plane y = 0, rubbed by less and by more than Coulomb's bound, and one without a plane."""
     motion, contact = Motion(), Contact()
     places = [[1.0, 0.0, 2.0], [3.0, 0.0, 4.0], [5.0, 6.0, 7.0]]
     motion.position = on(places, wp.vec3d)
     contact.normal = on([[0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]], wp.vec3d)
-    contact.friction = 0.25
+    contact.friction, contact.ball = 0.25, on(np.zeros(3), wp.float64)
     contact.pressed, contact.rubbed = on([40.0, 8.0, 5.0], wp.float64), on([[3.0, 9.0, -4.0]] * 3, wp.vec3d)
     contact.grip, contact.most = on([50.0, 50.0, 50.0], wp.float64), on(np.zeros(3), wp.float64)
     contact.anchor = on(np.zeros((3, 3)), wp.vec3d)
@@ -196,6 +206,7 @@ def test_what_presses_as_deep_as_before_gets_a_stiffer_skin():
     motion.fixed = on(np.zeros(4), wp.int8)
     contact.centre, contact.normal = on(np.zeros((4, 3)), wp.vec3d), on([[0.0, 1.0, 0.0]] * 3 + [[0.0] * 3], wp.vec3d)
     contact.skin, contact.grip = on([100.0] * 4, wp.float64), on([50.0] * 4, wp.float64)
+    contact.ball = on(np.zeros(4), wp.float64)
     contact.pressed, contact.most = on([2.0] * 4, wp.float64), on(np.zeros(4), wp.float64)
     contact.anchor, contact.rubbed = on(np.zeros((4, 3)), wp.vec3d), on(np.zeros((4, 3)), wp.vec3d)
     contact.depth = on([1e-3] * 4, wp.float64)
@@ -213,6 +224,7 @@ def test_forces_of_body_and_friction_are_the_gradient_of_their_energy():
     contact, count = Contact(), len(places)
     contact.centre, contact.normal = on(np.zeros((count, 3)), wp.vec3d), on([[0.0, 1.0, 0.0]] * count, wp.vec3d)
     contact.skin, contact.grip = on([100.0] * count, wp.float64), on([50.0] * count, wp.float64)
+    contact.ball = on(np.zeros(count), wp.float64)
     contact.pressed, contact.most = on([0.0, 0.5, 0.5, 0.5], wp.float64), on([1.0, 1.0, 1.0, 0.0], wp.float64)
     off = np.array([[0.01, 0.3, 0.0], [0.6, 0.0, 0.8], [0.0, 0.0, 0.01], [0.1, 0.0, 0.0]])
     contact.anchor = on(places + off, wp.vec3d)
