@@ -22,6 +22,9 @@ from warpflat.flat.surface.paths.edge_paths import EdgeGraph, path_length
 
 __all__ = ["cut_surfaces", "separate"]
 
+# Of a part's border so many places may be ends of its datum.
+_ENDS = 400
+
 
 def separate(result: Flattening) -> tuple[Flattening, ...]:
     """Separate a result into one per piece that the cuts have left, each with its own name, network, measures and cuts.
@@ -131,7 +134,9 @@ def _upright(surface: Surface, positions: FloatArray, datum: IntArray) -> IntArr
     longest = max((run for run in runs if run[0] >= 0), key=len, default=datum[:0])
     if len(longest) > 1:
         return longest
-    loop = border_of(surface)
+    # All places of a fine mesh would make millions of pairs.
+    border = border_of(surface)
+    loop = border[:: len(border) // _ENDS + 1]
     way = positions[loop] - positions[loop][:, None]
     # Of the chords that are half as tall as the part.
     tall = way[..., 1] >= 0.5 * np.ptp(positions[:, 1])
