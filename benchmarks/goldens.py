@@ -379,7 +379,7 @@ def outline_distance(before: list[list[int]], after: list[list[int]]) -> float:
     middle, reach = new.mean(axis=0), np.ptp(new, axis=0).max()
 
     def apart(motion: np.ndarray) -> np.ndarray:
-        """Of the new corners, turned about their middle and shifted, from the old outline; and the other way round."""
+        """Return how far the new corners, turned about their middle and shifted, are from the old outline, and old ones from the new."""
         cos, sin = np.cos(motion[2] / reach), np.sin(motion[2] / reach)
         turn = np.array([[cos, sin], [-sin, cos]])
         there, back = (new - middle) @ turn + middle + motion[:2], (old - middle - motion[:2]) @ turn.T + middle

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from warpflat.garment.mannequin.body_model import BodyModel, Person, rotation
 from warpflat.garment.mannequin.common_body import CommonBody, common_body_of_mannequin
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.stand_body import StandingBody, stand_body
 
-__all__ = ["body_of_size", "built_once", "laid_once", "stood", "with_bent_elbows"]
+__all__ = ["body_of_size", "built_once", "laid_once", "mean_person", "stood", "with_bent_elbows"]
 
 _from_size = Mannequin.from_size
 
@@ -62,3 +63,14 @@ def with_bent_elbows(body: Mannequin) -> Mannequin:
             turn = np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
             vertices[grid[row]] = joint + (vertices[grid[row]] - joint) @ turn.T
     return replace(body, vertices=vertices)
+
+
+def mean_person(model: BodyModel) -> Person:
+    """The body of no shape in particular, 1.7 times as large as the model and in its pose."""
+    return Person(
+        shape=np.zeros(len(model.shapes)),
+        bend=rotation(np.zeros((len(model.joints), 3))),
+        turn=np.eye(3),
+        scale=1.7,
+        place=np.zeros(3),
+    )

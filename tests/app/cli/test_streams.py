@@ -8,12 +8,12 @@ import sys
 from pathlib import Path
 
 import click
-import numpy as np
 import pytest
 import trimesh
+from bodies import mean_person
 
 from warpflat.app.cli.main import cli
-from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation
+from warpflat.garment.mannequin.body_model import BodyModel, finer_body
 
 QUICK = "[relax]\nmax_steps = 30\n[output]\nframes = 0\npicture = false\n[pattern]\nformats = ['json']\n"
 CAP = "datum = 'centre'\n[surface]\nshape = 'bodice'\nresolution = 5\n"
@@ -47,9 +47,7 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "skirt.obj").write_bytes(SKIRT)
     (folder / "square.svg").write_text(SQUARE)
     model, (finer, triangles) = BodyModel.load(), finer_body()
-    upright = rotation(np.zeros((len(model.joints), 3)))
-    person = Person(shape=np.zeros(len(model.shapes)), bend=upright, turn=np.eye(3), scale=1.7, place=np.zeros(3))
-    trimesh.Trimesh(finer @ model.vertices(person), triangles, process=False).export(folder / "body.obj")
+    trimesh.Trimesh(finer @ model.vertices(mean_person(model)), triangles, process=False).export(folder / "body.obj")
     return folder
 
 

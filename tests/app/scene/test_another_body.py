@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from bodies import body_of_size
+from bodies import body_of_size, mean_person
 from command import Command
 
 from warpflat.app.scene.fit import STUDY_FILES, FitJob, Fitted, ease_wishes, fit_to, study_table
@@ -133,13 +133,7 @@ def test_several_bodies_are_a_study_with_asked_ease(command: Command):
 
 def test_scans_of_one_name_are_told_apart_and_none_is_replaced(command: Command):
     model = BodyModel.load()
-    person = Person(
-        shape=np.zeros(len(model.shapes)),
-        bend=rotation(np.zeros((len(model.joints), 3))),
-        turn=np.eye(3),
-        scale=1.7,
-        place=np.zeros(3),
-    )
+    person = mean_person(model)
     matrix, triangles = finer_body()
     _skirt(Path("skirt.obj"))
     files = [Path(folder, "skirt.body.obj") for folder in "ab"]

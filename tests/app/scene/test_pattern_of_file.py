@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from bodies import mean_person
 from command import Command
 from scipy.spatial import cKDTree
 from surface_meshes import quads_between
@@ -18,7 +19,7 @@ from warpflat.app.scene.outside_pattern import OutsideJob
 from warpflat.garment.construction.as_cut import read_cut_pattern, worn_at
 from warpflat.garment.construction.sewn_panels import read_sewn_panels
 from warpflat.garment.draping.mesh_pieces import mesh_pieces
-from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation
+from warpflat.garment.mannequin.body_model import BodyModel, finer_body, rotation
 from warpflat.pattern.drafting.piece_parts import Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.pattern.export.read_pattern import read_pattern
@@ -126,13 +127,7 @@ def test_a_worn_mesh_lies_on_the_scan_that_stands_where_it_does(tmp_path: Path):
     """The scan is in cm, turned, aside and below, its legs apart; a garment beside it starts as on any other body."""
     body, corners = finer_body()
     model = BodyModel.load()
-    person = Person(
-        shape=np.zeros(len(model.shapes)),
-        bend=rotation(np.zeros((len(model.joints), 3))),
-        turn=np.eye(3),
-        scale=1.7,
-        place=np.zeros(3),
-    )
+    person = mean_person(model)
     skin = body @ model.vertices(person)
     turn = rotation(np.array([[0.0, 0.6, 0.0]]))[0]
     aside = np.array([0.4, -1.2, 0.7])
