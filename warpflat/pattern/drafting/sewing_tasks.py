@@ -111,6 +111,7 @@ class SewingTasks:
             if self.stands_for_both(task.seams):
                 seam = replace(task.seams[0], name=name, openings=())
                 self.tasks.append(Task(technique=self._technique([seam]), seams=[seam], like=task))
+                self.lengths[name] = self.lengths[task.seams[0].name]
         self._finish(garment.garment.elastics)
 
     def stands_for_both(self, group: Sequence[Seam]) -> bool:
