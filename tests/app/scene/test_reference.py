@@ -38,6 +38,12 @@ def test_every_table_and_key_is_described_and_every_example_is_valid(reference: 
     for table, model in tables.items():
         notes = reference.key_notes()[table]
         assert set(notes) == {reference.key_of(*each) for each in model.model_fields.items()}, table
+        described = {
+            reference.key_of(name, model.model_fields[name])
+            for name in reference.docstrings_of_keys(model)
+            if name in model.model_fields
+        }
+        assert not described & {key for key, note in notes.items() if "about" in note}, table
         for name, field in model.model_fields.items():
             reference.validate_example(model, name, notes[reference.key_of(name, field)]["example"])
 
