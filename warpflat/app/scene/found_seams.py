@@ -27,7 +27,7 @@ from warpflat.core import (
     reading,
     require_memory_for_run,
 )
-from warpflat.flat import half_edges, weld_map
+from warpflat.flat import corner_means, half_edges, weld_map
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -261,9 +261,7 @@ def _named_by_file(found: FoundSeams, seams: FileSeams, read: GarmentFile) -> Fo
     from scipy.spatial import cKDTree
 
     raw = read.raw
-    corners = raw.polygons >= 0
-    middle = (raw.vertices[np.maximum(raw.polygons, 0)] * corners[..., None]).sum(axis=1) / corners.sum(axis=1)[:, None]
-    tree = cKDTree(middle * read.scale)
+    tree = cKDTree(corner_means(raw.vertices, raw.polygons) * read.scale)
     islands, titles = list[int](), list[list[str]]()
     named = {"materials": raw.face_material, "groups": raw.face_group}
     for piece in found.pieces:

@@ -24,7 +24,7 @@ from warpflat.app.scene.pattern_options import pattern_options
 from warpflat.app.scene.schema import PieceTable
 from warpflat.app.scene.seams import scene_constraints, scene_surface_seams, scene_wishes
 from warpflat.app.scene.surface import scene_pieces, scene_sewn_panels, scene_surface, with_piece_tables
-from warpflat.core import InputError, StepError, optional_step, report_activity
+from warpflat.core import InputError, StepError, optional_step, report_activity, without_side
 from warpflat.flat import (
     Flattening,
     Progress,
@@ -351,7 +351,7 @@ class GarmentPlan(Plan):
         on_fold = () if cloth.fold is None else cloth.grid_vertices[cloth.edges[cloth.fold]].tolist()
         for remedy in advised.remedies:
             row = cloth.grid_vertices[remedy.path]
-            title = remedy.words.split(",")[0].removeprefix("a ").removesuffix(" left").removesuffix(" right")
+            title = without_side(remedy.words.split(",")[0].removeprefix("a "))
             dart = dart_along(self.mannequin.layout, self.form.vertices, self.bricks[name], row, piece=name, name=title)
             table = None if dart is None or row[-1] in on_fold else cut_of_dart(dart)
             remedies.append(replace(remedy, table=table))

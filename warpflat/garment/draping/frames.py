@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core import latest_file
+from warpflat.flat import corner_means
 from warpflat.garment.draping.result import Drape
 from warpflat.pattern import (
     ENERGY,
@@ -17,7 +18,6 @@ from warpflat.pattern import (
     SKIN,
     Scale,
     begin_stage,
-    corner_mean,
     define_group,
     define_mesh,
     export_stage,
@@ -113,6 +113,6 @@ def write_drape_frames(path: Path, drape: Drape) -> None:
         for name in drape.cloth.piece_vertices:
             faces = drape.cloth.flat_faces[drape.cloth.piece_faces[name]]
             if name in shown and layer.GetPrimAtPath(shown[name]):
-                gaps = corner_mean(drape.gap[drape.cloth.welded], faces)
+                gaps = corner_means(drape.gap[drape.cloth.welded], faces)
                 set_face_map(layer, shown[name], "gap", gaps, unit="m", state="draped")
     export_stage(stage, path)
