@@ -22,7 +22,7 @@ from warpflat.flat.fabric.fabric import Fabric
 from warpflat.flat.fabric.limits import Amount, Demand
 from warpflat.flat.model.network import SpringNetwork
 from warpflat.flat.model.strain import shear_angles, worn_cell_strain
-from warpflat.flat.model.wear import SKIN_LENGTH, smooth_face_values, thread_curvatures
+from warpflat.flat.model.wear import smooth_face_values, thread_curvatures
 from warpflat.flat.surface.connectivity import border_of, components
 from warpflat.flat.surface.curvature import curvature_tensors
 from warpflat.flat.surface.energy_map import place_in_words, smooth_to_vertices
@@ -241,7 +241,7 @@ def assess_fit(network: SpringNetwork, positions: FloatArray) -> WornFit:
     tension_warp, tension_weft, loaded = mean(pull[:, 0]), mean(pull[:, 1]), mean(load)
     # A million faces of them take a tenth of a gigabyte each, and the smoothing more.
     del strain, stress, lengths, spread, pull, load, along_warp, along_weft, crossed
-    pressure = smooth_face_values(surface, loaded, SKIN_LENGTH)
+    pressure = smooth_face_values(surface, loaded)
     # A stretch that is asked for beyond the limit is meant: the cloth is judged from there.
     asked = np.zeros((faces, 2)) if network.stretch is None else network.stretch - 1.0
     meant = np.where(asked > fabric.strain_limit, asked, 0.0)

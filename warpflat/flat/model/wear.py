@@ -83,9 +83,9 @@ def thread_curvatures(network: SpringNetwork, positions: FloatArray) -> tuple[Fl
     return along[:, 0], along[:, 1], along[:, 2]
 
 
-def smooth_face_values(surface: Surface, values: FloatArray, length: float) -> FloatArray:
-    """Return face values (#F) smoothed over a length on the surface [m], #F."""
-    return corner_means(smooth_to_vertices(surface, values, smoothing_length=length), surface.faces)
+def smooth_face_values(surface: Surface, values: FloatArray) -> FloatArray:
+    """Return face values (#F) smoothed as skin is, #F."""
+    return corner_means(smooth_to_vertices(surface, values, smoothing_length=SKIN_LENGTH), surface.faces)
 
 
 def intended_stretch(
@@ -122,9 +122,7 @@ def intended_stretch(
     face_area = np.maximum(np.bincount(network.cell_arrays.face, area, minlength=len(surface.faces)), 1e-300)
     curved = [
         smooth_face_values(
-            surface,
-            np.bincount(network.cell_arrays.face, area * k, minlength=len(surface.faces)) / face_area,
-            SKIN_LENGTH,
+            surface, np.bincount(network.cell_arrays.face, area * k, minlength=len(surface.faces)) / face_area
         )
         for k in thread_curvatures(network, positions)[:2]
     ]
