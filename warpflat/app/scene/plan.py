@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from warpflat.app.scene.cuts import CutSequence, cut_of_dart, plan_automatic_cuts, plan_cuts
 from warpflat.app.scene.form import scene_form, scene_mannequin
-from warpflat.app.scene.found_seams import found_seams, plain_panel, seams_entry
+from warpflat.app.scene.found_seams import found_seams, plain_panel
 from warpflat.app.scene.frames import FrameRecorder
 from warpflat.app.scene.load import (
     Scene,
@@ -270,7 +270,7 @@ class MeshPlan(Plan):
         """See :meth:`Plan.further_metrics`: the seams that were found."""
         if self.found is None:
             return {}
-        return {"garment": seams_entry(self.found, list(garment.pieces.values()), self.drawing.rules.seam)}
+        return {"garment": self.found.entry(list(garment.pieces.values()), self.drawing.rules.seam)}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -11,9 +11,11 @@ import numpy as np
 
 from warpflat.core import AXES, FloatArray, InputError, is_number, nearest, quote_value
 
-__all__ = ["FAMILIES", "Direction", "SeamCut", "SeamOptions", "in_family"]
+__all__ = ["FAMILIES", "NO_PATTERN", "Direction", "SeamCut", "SeamOptions", "in_family"]
 
 Direction = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+#: More than this share of the cloth beyond its limit is no pattern yet.
+NO_PATTERN = 0.1
 #: Names of seams that are found, without their side.
 FAMILIES = (
     "armhole",
