@@ -145,8 +145,7 @@ def left_and_right_apart(found: FoundSeams) -> float:
 
 def draped(garment: Garment, layers: list[Surface]) -> str:
     """Return the distance of the sewn cloth at rest over the mesh that was given, mean and 95 % [mm]."""
-    seams = [(pair.pieces, pair.vertices) for pair in garment.stitching]
-    cloth = sew_cloth(list(garment.pieces.values()), seams=seams)
+    cloth = sew_cloth(garment)
     begin = np.cumsum([0, *(len(layer.vertices) for layer in layers)])
     faces = [np.where(layer.faces >= 0, layer.faces + first, -1) for layer, first in zip(layers, begin, strict=False)]
     body = Body(

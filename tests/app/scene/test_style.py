@@ -40,6 +40,14 @@ def test_length_moves_the_hem_and_what_is_sewn_to_it():
     assert tables_of("shift_dress", length="ankle")["form"]["profiles"]["ankle"]["scale"] == 1.15
 
 
+def test_a_longer_sleeve_has_ease_all_the_way_down():
+    ease = tables_of("tshirt", sleeve_length="wrist")["ease"]
+    assert [ease[level] for level in ("biceps", "elbow", "forearm", "wrist")] == [6, 6, 6, 6]
+    # What a garment says of its levels stays.
+    assert tables_of("shirt", sleeve_length="forearm")["ease"]["elbow"] == 8
+    assert "forearm" not in tables_of("tshirt", sleeve_length="elbow")["ease"]
+
+
 def test_neckline_ease_flare_and_closure():
     tables = tables_of(
         "shift_dress", neck_depth="8", neck_width="2", ease_waist="12", flare="20", closure="zip-side", ease_bust="7"

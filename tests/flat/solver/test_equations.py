@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from devices import DEVICE
@@ -32,14 +34,33 @@ def test_the_gradients_of_the_equations_are_their_forces(kind: int):
     ends = np.array([[0, 1, 10, 11], [2, 20, 24, 2], [7, 12, 17, 18]], dtype=np.int32)
     stiffness, target = np.array([300.0, 500.0, 200.0]), np.array([0.01, -0.02, 0.03])
     coefficient = random.normal(size=(3, 4, 2)) if kind == LINEAR else None
-    sewn.sew(ends, np.array([1.0, 1.2, 0.0]), stiffness, kind=np.full(3, kind), target=target, coefficient=coefficient)
+    sewn.sew(
+        ends, np.array([1.0, 1.2, 0.0]), stiffness, kind=np.full(3, kind), target=target, coefficient=coefficient,
+        offset=np.array([0.004, -0.001, 0.002]),
+    )  # fmt: skip
     assert sewn.seams is not None
-    sewn.seams.offset.assign(np.array([0.004, -0.001, 0.002]))
     state = Relaxation(sewn, RelaxOptions(), start=flat)
     missed = sewn.seam_residuals(state.position) + sewn.seams.offset.numpy()
     gradient = (equation_rows(sewn, flat).T @ (np.sqrt(stiffness) * missed)).reshape(-1, 2)
     np.testing.assert_allclose(gradient, forces_of(alone, flat) - forces_of(sewn, flat), atol=1e-9)
     assert np.abs(gradient).max() > 0.1
+
+
+def test_a_network_is_as_sewn_in_another_process():
+    surface = make_shape("dome", resolution=5)
+    flat = surface.vertices[:, :2].copy()
+    sewn = SpringNetwork.build(surface, find_fabric("isotropic"), flat, device=DEVICE)
+    sewn.sew(
+        np.array([[0, 1, 10, 11], [7, 12, 17, 18]], dtype=np.int32), np.array([1.1, 0.0]), np.array([300.0, 200.0]),
+        kind=np.array([LENGTHS, LINEAR]), target=np.array([0.01, 0.02]), coefficient=np.full((2, 4, 2), 0.3),
+        offset=np.array([0.004, -0.001]),
+    )  # fmt: skip
+    sewn.keep_vertical(np.array([2, 7], dtype=np.int32))
+    there = pickle.loads(pickle.dumps(sewn))
+    np.testing.assert_array_equal(forces_of(there, flat), forces_of(sewn, flat))
+    place = Relaxation(sewn, RelaxOptions(), start=flat).position
+    assert there.seam_energy(place) == sewn.seam_energy(place) > 0.0
+    np.testing.assert_array_equal(forces_of(there, flat)[[2, 7], 0], 0.0)
 
 
 @pytest.fixture(scope="module")

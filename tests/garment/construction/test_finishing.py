@@ -8,9 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from flat_forms import flat_form, pattern_of, whole_draft
+from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
 from warpflat.garment.construction.details import FinishingTable, OpeningTable
+from warpflat.garment.construction.facings import with_facings
 from warpflat.garment.construction.garment import Garment
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.fitting import drawn_length
@@ -54,6 +56,18 @@ def test_facings_repeat_the_neck_and_are_joined_at_the_shoulders(parted: Garment
         notched = [piece.name for piece in drafted.pieces[""] for notch in piece.notches if notch.seam == seam]
         assert len(notched) % 2 == 0
         assert len(set(notched)) == 2
+
+
+def test_facings_are_joined_where_a_dart_parts_one_side_of_the_seam():
+    # The front's side is parted by the bust dart, and its facing lies along the upper part.
+    faced = with_facings(sample_dress(), [("front bodice", "armhole"), ("back bodice", "armhole")], 0.040)
+    seam = next(seam for seam in faced.seams if seam.name == "side of armhole facing")
+    assert [side.place for side in seam.stretches] == [
+        ("front_bodice_armhole_facing", "side_upper"),
+        ("back_bodice_armhole_facing", "side"),
+    ]
+    lengths = [faced.piece(side.piece, "38").edge(side.edge).length for side in seam.stretches]
+    assert lengths == pytest.approx([0.040, 0.040])
 
 
 def test_band_of_a_closed_neck_is_a_ring(half: Garment):

@@ -445,6 +445,16 @@ def test_rules_name_holes():
 # --- once more, from pattern.json
 
 
+def test_an_edge_read_back_is_the_line_and_keeps_its_map_to_the_mesh():
+    pattern, _ = pattern_of_surface([flatten(make_shape("dome", resolution=9), fabric="woven")], name="p")
+    drafted = draft_garment(pattern)
+    read = pattern_from_json(json.loads(json.dumps(pattern_json(drafted))))
+    assert pattern_json(read) == pattern_json(drafted)
+    for edge in read.pieces[""][0].edges:
+        assert edge.edge.vertices is None
+        assert len(edge.edge.points) == len(edge.line) > len(edge.places) == len(edge.mesh_vertices)
+
+
 def test_a_pattern_read_back_makes_the_same_files(
     dress: DraftedGarment, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -15,7 +15,7 @@ from warpflat.garment.construction.pockets import add_pockets
 from warpflat.garment.construction.shaped_band import with_shaped_waistband
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.piece_parts import Edge
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
 
 PATCH = PocketTable(
     kind="patch", piece="front", width_mm=120, height_mm=140, line="hip", below_mm=20, from_centre_mm=50
@@ -94,6 +94,21 @@ def test_opening_of_bags_is_notched_on_both_sides_of_the_seam():
     assert all(seam.matches for seam in drafted.seams)
     with pytest.raises(InputError, match=r"ends 800 mm along 'side left'"):
         add_pockets(skirt(), [PocketTable(kind="inseam", seam="side left", width_mm=150, height_mm=400, below_mm=400)])
+
+
+@pytest.mark.parametrize("zipped", ["side left", "side right"])
+def test_pocket_in_a_seam_is_clear_of_its_zip(zipped: str):
+    seams = [
+        replace(seam, openings=(SeamOpening(kind="zip", length=0.2),)) if seam.name == zipped else seam
+        for seam in skirt().seams
+    ]
+    pattern = replace(skirt(), seams=seams)
+    with pytest.raises(InputError, match=f"from 60 to 220 mm along '{zipped}' meets the zip there, from 0 to 200 mm"):
+        add_pockets(pattern, [BAGS])
+    with pytest.raises(InputError, match=f"from 0 to 140 mm along '{zipped}' meets the zip"):
+        add_pockets(pattern, [PocketTable(kind="hip", seam="side left", width_mm=50, height_mm=140)])
+    below = add_pockets(pattern, [BAGS.model_copy(update={"below_mm": 225.0})])
+    assert "pocket_bag" in {piece.name for piece in below.pieces[""]}
 
 
 def test_shaped_waistband_and_skirt_are_the_skirt_before():

@@ -13,6 +13,8 @@ import pytest
 from bodies import body_of_size
 from PIL import Image
 from pxr import Sdf, Usd, UsdGeom
+from scipy.spatial import Delaunay
+from surface_meshes import cylinder, grid
 
 import warpflat
 from warpflat.app.review.faults import faults_of
@@ -24,6 +26,9 @@ from warpflat.flat.fabric.fabric import grain_axes
 from warpflat.flat.fabric.library import find_fabric, load_library
 from warpflat.flat.model.membrane import make_cloth
 from warpflat.flat.surface.connectivity import border_loops
+from warpflat.flat.surface.paths.lines import with_lines
+from warpflat.flat.surface.repair.validate import make_surface
+from warpflat.garment.construction.details import SeamTable
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.drape_energy import DrapeEnergy
 from warpflat.garment.draping.drape_garment import thread_elastics
@@ -56,6 +61,29 @@ def test_seams_are_welded_and_the_rest_state_is_the_flat_pattern(bodice: warpfla
     laplacian, stiffness = cloth.laplacian()
     np.testing.assert_allclose((laplacian @ np.ones(len(cloth.designed))), 0.0, atol=1e-12)
     assert (stiffness > 0.0).sum() > 0.8 * len(stiffness)
+
+
+def test_a_garment_of_meshes_keeps_its_seams():
+    """Two halves of a bent sheet meet along a column; a tube is sewn between lines of five vertices and of nine, at those that agree."""
+    points, faces = grid(9, 5, cylinder)
+    left = make_surface(points, faces[np.arange(len(faces)) % 8 < 4], name="left")
+    right = make_surface(points, faces[np.arange(len(faces)) % 8 >= 4], name="right")
+    cloth = sew_cloth(warpflat.sew_pieces([warpflat.flatten(each, fabric="woven") for each in (left, right)]))
+    assert len(cloth.designed) == len(points)
+    assert sorted(map(len, border_loops(cloth.faces))) == [24]
+
+    heights, across = np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.0, 9)
+    u, v = np.meshgrid(across, heights)
+    coarse = (u.ravel() == 0.0) & (np.arange(u.size) // 9 % 2 == 1)
+    place = np.column_stack([u.ravel(), v.ravel()])[~coarse]
+    angle = 2.0 * np.pi * place[:, 0]
+    tube = np.column_stack([0.1 * np.sin(angle), 0.3 * place[:, 1], 0.1 * np.cos(angle)])
+    triangles = Delaunay(place).simplices
+    ends = {name: np.flatnonzero(place[:, 0] == side) for name, side in (("one", 0.0), ("other", 1.0))}
+    surface = with_lines(make_surface(tube, triangles, name="tube", weld=False), ends)
+    seam = SeamTable(name="seam", sides=["one", "other"])
+    cloth = sew_cloth(warpflat.sew_pieces([warpflat.flatten(surface, fabric="woven")], seams=[seam]))
+    assert len(cloth.designed) == len(place) - 5
 
 
 def no_strains(faces: np.ndarray) -> dict[str, np.ndarray]:
@@ -288,6 +316,13 @@ def test_a_corrected_pattern_halves_the_misfit_and_keeps_its_seams():
     # What is draped again is what was found.
     again = warpflat.drape(new)
     np.testing.assert_allclose(again.positions, found.after.positions, atol=1e-9)
+
+
+def test_a_pattern_is_not_corrected_from_another_cloth_that_is_not_at_rest(worn: warpflat.Drape):
+    hurried = dataclasses.replace(worn, options=warpflat.DrapeOptions(max_steps=100))
+    for other in ({"fabric": find_fabric("denim")}, {"worn_shape": True, "fabric": find_fabric("denim")}):
+        with pytest.raises(InputError, match="the drape in denim is not at rest"):
+            warpflat.correct_pattern(hurried, rounds=0, **other)
 
 
 class _Cylinder:

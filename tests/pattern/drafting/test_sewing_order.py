@@ -225,6 +225,8 @@ def test_of_halves_on_the_fold_both_sides_are_sewn(openings: tuple[SeamOpening, 
     seam = Seam(name="side left", sides=(sides[0], sides[1]), openings=openings)
     drafted = draft_garment(Pattern(name="skirt", pieces={"": [half("front"), half("back")]}, seams=[seam]))
     assert [step.words for step in sewing_steps(drafted, "")][: len(expected)] == expected
+    # In the table of seams both sides have their length.
+    assert {seam.length_mm for seam in sewn_seams(drafted, "")} == {(500.0, 500.0)}
 
 
 def test_pocket_and_straps_that_no_seam_takes_are_sewn_on():

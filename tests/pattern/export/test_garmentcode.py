@@ -268,6 +268,27 @@ def worn() -> Pattern:
     return Pattern(name="worn", pieces={"": [front, back, sleeve]}, seams=seams)
 
 
+def test_a_panel_keeps_its_cloths_and_how_often_it_is_cut(tmp_path: Path):
+    """A sleeve of the pair is a panel; of the bags, sewn to their copies that are turned over, each side has two."""
+    pattern = worn()
+    cut = {"front": {}, "back": {"also": {"fusible": 1}}, "sleeve": {"also": {"fusible": 2}}}
+    pieces = [replace(piece, fabric="wool", **cut[piece.name]) for piece in pattern.pieces[""]]
+    bag = piece_of("bag", [(0.0, 0.0), (0.2, 0.0), (0.2, 0.2)], quantity=4, fabric="cotton")
+    rim = side_of("bag.e2", reversed=False)
+    both = Seam(name="rim", sides=(rim, tuple(replace(side, mirrored=True) for side in rim)))
+    patch = piece_of("patch", [(0.0, 0.0), (0.2, 0.0), (0.2, 0.2)], quantity=2, paired=False)
+    given = replace(pattern, pieces={"": [*pieces, bag, patch]}, seams=[*pattern.seams, both])
+    file = tmp_path / "worn_specification.json"
+    write_garmentcode(draft_garment(given, true=False), file)
+    found = read_pattern(file)
+    assert {piece.name: (piece.fabric, piece.quantity, dict(piece.also)) for piece in found.pieces[""]} == {
+        "front": ("wool", 1, {}), "back": ("wool", 1, {"fusible": 1}),
+        "sleeve": ("wool", 1, {"fusible": 1}), "sleeve mirrored": ("wool", 1, {"fusible": 1}),
+        "bag": ("cotton", 2, {}), "bag mirrored": ("cotton", 2, {}), "patch": ("", 2, {}),
+    }  # fmt: skip
+    assert not any(found.piece(name, "").is_pair for name in ("bag", "bag mirrored", "patch"))
+
+
 def test_a_pattern_comes_back_with_its_lengths_and_seams(tmp_path: Path):
     drafted = draft_garment(worn(), true=False)
     file = tmp_path / "worn_specification.json"

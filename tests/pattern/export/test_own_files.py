@@ -65,6 +65,13 @@ def test_allowances_are_those_that_are_drawn(ending: str, tmp_path: Path):
 
 
 @BOTH
+def test_hems_and_raw_edges_stay_what_they_are(ending: str, tmp_path: Path):
+    kinds = ("hem", "cut", "seam", "cut")
+    (piece,) = through(drafted(polygon("band", corners_of(0.2, 0.3), kinds=kinds)), ending, tmp_path).pieces[""]
+    assert tuple(edge.kind for edge in piece.edges) == kinds
+
+
+@BOTH
 def test_a_pleat_is_sewn_as_far_as_before(ending: str, tmp_path: Path):
     (piece,) = through(darted(pleat=0.04), ending, tmp_path).pieces[""]
     (dart,) = piece.darts

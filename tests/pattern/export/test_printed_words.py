@@ -171,3 +171,20 @@ def test_what_is_cut_from_a_cloth_is_told_with_all_mirrored_copies(tmp_path: Pat
     said = " ".join(page.extract_text() for page in PdfReader(tmp_path / "p.pdf").pages)
     assert "cuff 6, 3 mirrored" in said
     assert "cuff 2, 1 mirrored" in said
+
+
+def test_lines_of_another_program_are_given_no_finish(tmp_path: Path):
+    """What is to become of an edge, its file does not say."""
+    shapes = "".join(
+        f'<rect id="{name}" x="{x}" width="250" height="350"/>' for name, x in (("front", 0), ("back", 280))
+    )
+    drawing = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="600mm" height="400mm" viewBox="0 0 600 400">{shapes}</svg>'
+    )
+    (tmp_path / "foreign.svg").write_text(drawing)
+    garment = read_drafted(tmp_path / "foreign.svg")
+    assert sewing_steps(garment, "") == ()
+    write_pdf(garment, tmp_path / "p.pdf")
+    said = " ".join(page.extract_text() for page in PdfReader(tmp_path / "p.pdf").pages)
+    assert "No allowances are included. Lay every grain" in said
+    assert "Sewing order" not in said

@@ -386,7 +386,8 @@ class GarmentPlan(Plan):
             if size != self.size:
                 with errors_named(f"{self.scene.where}: pattern.sizes"):
                     body, form = scene_form(self.scene, scene_mannequin(self.scene, size=size))
-                found[size] = replace(self, mannequin=body, form=form, openings=_sized_openings(self.scene, form))
+                    openings = _sized_openings(self.scene, form)
+                found[size] = replace(self, mannequin=body, form=form, openings=openings)
         return found
 
 
@@ -538,7 +539,7 @@ def _sized_openings(scene: Scene, form: FormResult) -> list[OpeningTable]:
         if scene.settings.cloth is not None and scene.settings.cloth.lining:
             # A lining is sewn to the inner edges of the facings of button stands.
             opening = opening.model_copy(update={"facing": opening.facing or "separate"})
-        with errors_named(f"{scene.where}: openings[{number}]"):
+        with errors_named(f"openings[{number}]"):
             found.append(sized_opening(form, opening, on_form))
     return found
 
@@ -559,9 +560,10 @@ def plan_garment(
     settings, options = scene.settings, flatten_options(scene, device)
     report_activity("building the mannequin")
     mannequin, form = built or scene_form(scene)
+    with errors_named(scene.where):
+        openings = _sized_openings(scene, form)
     with errors_named(f"{scene.where}: pattern"):
         drawing = pattern_options(settings.pattern, settings.marker, settings.cloth)
-        openings = _sized_openings(scene, form)
         if settings.half:
             drawing = replace(drawing, rules=sewn_centres(drawing.rules, openings))
         plan = plan_form(form, drawing.rules)

@@ -293,8 +293,11 @@ def _with_length(tables: dict[str, Any], key: str, text: str) -> dict[str, Any]:
         values["ruled"] = [["leg_thigh", new] if pair[-1] == old else list(pair) for pair in form.ruled]
         if levels_of.index(new) < levels_of.index(old) or new not in form.ease:
             tables = laid_over(tables, {"ease": {new: _ease(tables).get("leg_thigh", 0.0)}})
-    elif part == "arm" and new not in form.ease:
-        tables = laid_over(tables, {"ease": {new: _ease(tables).get("biceps", 0.0)}})
+    elif part == "arm":
+        # Down to its new hem it is nowhere narrower than between levels that have ease.
+        covered = [level for level in ARM_LEVELS[1 : ARM_LEVELS.index(new)] if level not in _ease(tables)]
+        covered += [new] if new not in form.ease else []
+        tables = laid_over(tables, {"ease": dict.fromkeys(covered, _ease(tables).get("biceps", 0.0))})
     if longer:
         values["profiles"] = laid_over(values.get("profiles", {}), {new: {"raise_cm": -longer}})
     found = _with_form(tables, values)

@@ -116,9 +116,12 @@ class SpringNetwork:
     bonds: Bonds = field(init=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Let another process have it, which makes the structs anew."""
+        """Let another process have it, which makes the structs anew, sewn and held upright as they are."""
         given = {each.name: getattr(self, each.name) for each in fields(self) if each.init and each.name != "device"}
-        return _make_network, (self.device.alias, given)
+        names = ("ends", "ratio", "stiffness", "kind", "target", "coefficient", "offset")
+        sewn = None if self.seams is None else {name: getattr(self.seams, name).numpy() for name in names}
+        upright = np.flatnonzero(self.bonds.freedom.numpy()[:, 0] == 0.0)
+        return _make_network, (self.device.alias, given, sewn, upright)
 
     @classmethod
     def build(
@@ -288,6 +291,7 @@ class SpringNetwork:
         kind: IntArray | None = None,
         target: FloatArray | None = None,
         coefficient: FloatArray | None = None,
+        offset: FloatArray | None = None,
     ) -> None:
         """Add seam and constraint equations (see `kernels.constraints`); by default, sew pairs of edges together.
 
@@ -298,6 +302,7 @@ class SpringNetwork:
             kind: #P, as in `kernels.constraints`.
             target: #P [m].
             coefficient: #P by 4 by 2.
+            offset: #P, with which they begin [m].
         """
         count, device = len(ends), self.device
         seams = Seams()
@@ -308,10 +313,10 @@ class SpringNetwork:
         coefficients = np.zeros((4 * count, 2)) if coefficient is None else coefficient.reshape(-1, 2)
         seams.coefficient = wp.array(coefficients, dtype=wp.vec2d, device=device)
         seams.stiffness = wp.array(stiffness, dtype=wp.float64, device=device)
-        seams.offset = wp.zeros(count, dtype=wp.float64, device=device)
+        seams.offset = wp.array(np.zeros(count) if offset is None else offset, dtype=wp.float64, device=device)
         self.seams = seams
-        slot, offset = counting_sort(np.ascontiguousarray(ends, dtype=np.int32).ravel(), self.vertex_count)
-        self.bonds.offset = _on(device, offset, wp.int32)
+        slot, first = counting_sort(np.ascontiguousarray(ends, dtype=np.int32).ravel(), self.vertex_count)
+        self.bonds.offset = _on(device, first, wp.int32)
         self.bonds.slot = _on(device, slot, wp.int32)
 
     def seam_residuals(self, position: wp.array) -> FloatArray:
@@ -340,8 +345,13 @@ class SpringNetwork:
         return self.spring_arrays.count
 
 
-def _make_network(device: str, given: dict[str, Any]) -> SpringNetwork:
-    return SpringNetwork(device=wp.get_device(device), **given)
+def _make_network(device: str, given: dict[str, Any], sewn: dict[str, Any] | None, upright: IntArray) -> SpringNetwork:
+    network = SpringNetwork(device=wp.get_device(device), **given)
+    if sewn is not None:
+        network.sew(**sewn)
+    if len(upright):
+        network.keep_vertical(upright)
+    return network
 
 
 def _on(device: wp.Device, values: NDArray[np.generic], dtype: type) -> wp.array:

@@ -127,11 +127,12 @@ def sewn_alike(
             any(shell.piece(side.piece, shell.sample).on_fold for side in both),
         )
         is_open = seam.name in gaps and (centre or not on_fold)
-        if not is_open and all(len(row) == 1 and (row[0].piece, row[0].edge) in parts for row in seam.sides):
-            along = [(side, parts[side.piece, side.edge]) for side in both]
+        # A dart that ends in the seam parts a side of it; the strip lies along the part that is nearest.
+        along = [[(side, parts[side.place]) for side in row if side.place in parts] for row in seam.sides]
+        if not is_open and all(len(row) == 1 for row in along):
             sides = [
                 replace(side, piece=part.piece, edge=part.edge, reversed=side.reversed != part.reversed)
-                for side, part in along
+                for ((side, part),) in along
             ]
             pattern = sewn(pattern, f"{seam.name} of {of}", sides[0], sides[1])
     return pattern

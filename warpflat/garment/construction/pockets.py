@@ -40,7 +40,7 @@ from warpflat.garment.construction.edges import (
 )
 from warpflat.garment.construction.mark_openings import with_notches
 from warpflat.garment.construction.strips import NARROW, Strip, folded_strip
-from warpflat.pattern import Edge, Pattern, Piece, SeamSide
+from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamSide
 
 __all__ = ["add_pockets"]
 
@@ -187,6 +187,7 @@ def _with_hip_pocket(pattern: Pattern, pocket: PocketTable) -> Pattern:
     # Of pieces that are cut in pairs both seams have one edge.
     fronts = dict[tuple[str, str], SeamSide]()
     for seam in opened:
+        _check_clear(seam, 0.0, pocket.height)
         found = [row[0] for row in seam.sides if len(row) == 1 and "front" in row[0].piece.split("_")]
         if not found:
             raise InputError(f"a hip pocket lies in a front, and {seam.name!r} joins none")
@@ -311,6 +312,21 @@ def _between_ends(ring: FloatArray, start: FloatArray, end: FloatArray, away: Fl
     return part
 
 
+def _check_clear(seam: Seam, begin: float, end: float) -> None:
+    """Check that a pocket's opening [m from the upper end of its seam], with what its bag runs past it, is clear of a zip or buttons there.
+
+    Raises:
+        InputError: it is not.
+    """
+    for other in seam.openings:
+        stop = other.begin + other.length
+        if other.kind in ("zip", "buttons") and begin - _PAST < stop and other.begin < end + _PAST:
+            raise InputError(
+                f"a pocket that opens from {1e3 * begin:.0f} to {1e3 * end:.0f} mm along {seam.name!r} meets the {other.kind} there, "
+                f"from {1e3 * max(other.begin, 0.0):.0f} to {1e3 * stop:.0f} mm: move one of them"
+            )
+
+
 def _check_end(end: float, called: str, whole: float) -> None:
     """Check that an opening ends above the lower end of a seam or an edge.
 
@@ -335,6 +351,7 @@ def _with_bags(pattern: Pattern, pocket: PocketTable) -> Pattern:
     title = free_piece_name(pattern, "pocket_bag")
     ends = [pocket.below, pocket.below + pocket.height]
     for seam in opened:
+        _check_clear(seam, *ends)
         first = seam.sides[0][0]
         for piece in in_sizes(pattern, first.piece):
             _check_end(ends[1], seam.name, piece.edge(first.edge).length)

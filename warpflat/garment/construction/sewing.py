@@ -121,15 +121,13 @@ class SewingNetwork:
             median = float(np.median(network.spring_arrays.listed_stiffness))
             relative = _RELATIVE_STIFFNESS if factor_pays(network, options) else _STIFFNESS_FOR_STEPS
             stiffness = np.where(equations.soft > 0, equations.soft * thread, relative * median)
+            begun = np.zeros(len(equations))
+            for numbers, known in offsets:
+                begun[numbers] = known
             network.sew(
                 equations.ends, equations.ratio, stiffness, kind=equations.kind, target=equations.target,
-                coefficient=equations.coefficient,
+                coefficient=equations.coefficient, offset=begun,
             )  # fmt: skip
-            assert network.seams is not None
-            offset = network.seams.offset.numpy().copy()
-            for numbers, known in offsets:
-                offset[numbers] = known
-            network.seams.offset.assign(offset)
         return network
 
     def fold_results(

@@ -42,7 +42,7 @@ def drape(
     The cloth starts at the designed surface; its rest state is the flat pattern in its own thread directions.
 
     Args:
-        garment: of :func:`warpflat.flatten_form`, or pieces whose cuts are closed.
+        garment: of :func:`warpflat.flatten_form` or :func:`warpflat.sew_pieces`, or pieces whose cuts are closed.
         body: a mannequin or a surface, such as a scan's; a garment's own mannequin, or a piece's own surface, if not given.
         hold: lines and edges that stay where they are, as "piece.line", or "line" for every piece that has one: those that
             would be sewn to what is not there.

@@ -11,14 +11,11 @@ from scipy.sparse import coo_array, csr_array
 
 from warpflat.core import FloatArray, InputError, IntArray, range_offsets
 from warpflat.flat import Fabric, Flattening, Surface, corner_triangles, grain_axes, join_labels, mesh_edges
-from warpflat.garment.construction.darts import dart_pairs
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.garment import Garment
 from warpflat.pattern import outline_edges
 
 __all__ = ["ClothPiece", "SewnCloth", "join_pieces", "piece_slices", "pieces_of", "sew_cloth", "worn_surface"]
-
-Seam = tuple[tuple[str, str], tuple[IntArray, IntArray]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -181,12 +178,11 @@ def pieces_of(garment: Garment | Flattening | Sequence[Flattening]) -> dict[str,
     return {piece.surface.name: piece for piece in ([garment] if isinstance(garment, Flattening) else garment)}
 
 
-def sew_cloth(garment: Garment | Flattening | Sequence[Flattening], *, seams: Sequence[Seam] = ()) -> SewnCloth:
+def sew_cloth(garment: Garment | Flattening | Sequence[Flattening]) -> SewnCloth:
     """Close the seams, darts and cuts of flat pieces.
 
     Args:
-        garment: a garment with the seams of its form, or flat pieces.
-        seams: further seams, each the names of two pieces and their vertices in corresponding order.
+        garment: a garment with its seams, or flat pieces.
 
     Raises:
         InputError: the pieces are of different cloths, a face is mirrored, or the garment consists of half pieces.
@@ -198,8 +194,6 @@ def sew_cloth(garment: Garment | Flattening | Sequence[Flattening], *, seams: Se
             raise InputError(
                 f"drape: piece {folded[0]} is half a piece on the fold; flatten the whole garment: half = false"
             )
-        runs = [(seam.pieces, run.vertices) for seam in garment.form.seams for run in seam.runs]
-        seams = [*runs, *((pair.pieces, pair.vertices) for pair in dart_pairs(garment.form)), *seams]
     if not pieces:
         raise InputError("drape: there is no piece; give a garment or at least one flat piece")
     fabrics = {piece.fabric for piece in pieces.values()}
@@ -212,15 +206,16 @@ def sew_cloth(garment: Garment | Flattening | Sequence[Flattening], *, seams: Se
     rows = piece_slices({name: piece.positions for name, piece in pieces.items()})
     # Pairs of vertices that are sewn together: along seams, and on the two sides of every cut.
     pairs: list[tuple[IntArray, IntArray]] = []
-    of_surface: dict[str, IntArray] = {}
     for name, piece in pieces.items():
         origin = piece.vertex_origin
         first = np.full(len(piece.surface.vertices), -1, dtype=np.int32)
         first[origin[::-1]] = np.arange(len(origin), dtype=np.int32)[::-1]
-        of_surface[name] = first + np.int32(rows[name].start)
         # The sides of a cut have doubled vertices of the surface.
-        pairs.append((np.arange(rows[name].start, rows[name].stop, dtype=np.int32), of_surface[name][origin]))
-    pairs += [(of_surface[names[0]][sides[0]], of_surface[names[1]][sides[1]]) for names, sides in seams]
+        pairs.append((rows[name].start + np.arange(len(origin)), rows[name].start + first[origin]))
+    for seam in garment.stitching if isinstance(garment, Garment) else ():
+        one, other = (rows[name].start + ids for name, ids in zip(seam.pieces, seam.vertices, strict=True))
+        # Sides of other vertices are sewn at their joints.
+        pairs.append((one, other) if seam.joints is None else (one[seam.joints[:, 0]], other[seam.joints[:, 1]]))
     cloth = {
         name: ClothPiece(
             piece.positions, piece.faces, piece.surface.vertices[piece.vertex_origin],

@@ -298,8 +298,9 @@ def _drafted_edge(edge: Edge, curve: Curve, fitted: tuple[Curve, float], points:
     untrued = shapely.LineString(line if curve is fitted[0] else fitted[0].sample())
     fit_error = float(shapely.distance(untrued, marks).max())
     return DraftedEdge(
-        edge=edge, curve=curve, line=line, width=edge.width, places=places, fit_error=fit_error, tolerance=fitted[1]
-    )
+        edge=edge, curve=curve, line=line, width=edge.width, places=places, fit_error=fit_error, tolerance=fitted[1],
+        mesh_vertices=edge.vertices,
+    )  # fmt: skip
 
 
 def nest_label(pieces: Sequence[DraftedPiece]) -> Label:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core import FloatArray, arc_lengths, points_at_lengths, polyline_length, short_repr
+from warpflat.core import FloatArray, IntArray, arc_lengths, points_at_lengths, polyline_length, short_repr
 from warpflat.pattern.drafting.curves import Curve
 from warpflat.pattern.drafting.label import Label
 from warpflat.pattern.drafting.piece_parts import Dart, Edge
@@ -40,6 +40,7 @@ class DraftedEdge:
         places: the length [m] along the line of each point of the edge as it came in (each vertex of its mesh).
         fit_error: largest distance [m] of the curve from these points, before its corners were trued.
         tolerance: the distance [m] that was allowed, besides what equal length takes.
+        mesh_vertices: the mesh vertex of each of these points; None of an edge that comes from no mesh.
     """
 
     edge: Edge
@@ -49,6 +50,7 @@ class DraftedEdge:
     places: FloatArray
     fit_error: float
     tolerance: float
+    mesh_vertices: IntArray | None = None
 
     @property
     def name(self) -> str:

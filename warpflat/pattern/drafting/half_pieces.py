@@ -252,4 +252,4 @@ def _with_curve(edge: DraftedEdge, curve: Curve, name: str = "") -> DraftedEdge:
     """Return an edge along another curve, of the same kind and width, and of the same name if no other is given."""
     line = curve.sample()
     shortened = Edge(name=name or edge.name, points=line, kind=edge.kind, allowance=edge.width)
-    return replace(edge, edge=shortened, curve=curve, line=line, places=arc_lengths(line))
+    return replace(edge, edge=shortened, curve=curve, line=line, places=arc_lengths(line), mesh_vertices=None)

@@ -53,7 +53,7 @@ def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size
         first, second = (line.length for line in lines)
         # Edges that come from no mesh have no common vertices, nor need copies of equal pieces.
         worst = None
-        if all(edge.edge.vertices is not None for line in lines for edge in line.edges) and (
+        if all(edge.mesh_vertices is not None for line in lines for edge in line.edges) and (
             len(lines[0].places) == len(lines[1].places)
         ):
             laid = (lines[0].laid, lines[1].laid) if seam.as_laid else None

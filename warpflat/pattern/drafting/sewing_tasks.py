@@ -111,6 +111,7 @@ class SewingTasks:
             if self.stands_for_both(task.seams):
                 seam = replace(task.seams[0], name=name, openings=())
                 self.tasks.append(Task(technique=self._technique([seam]), seams=[seam], like=task))
+                self.lengths[name] = self.lengths[task.seams[0].name]
         self._finish(garment.garment.elastics)
 
     def stands_for_both(self, group: Sequence[Seam]) -> bool:
@@ -264,11 +265,12 @@ class SewingTasks:
         sewn = {side.place for seam in self.seams for side in seam.stretches}
         # What is cut twice is drawn for one side.
         sewn |= {(of, other_side(edge)) for piece, edge in sewn for of in (piece, other_side(piece))}
+        # A line of another program's file does not say what is to become of it.
         self._free = {
             (piece.name, edge.name): edge.kind
             for piece in self.pieces.values()
             for edge in piece.edges
-            if edge.kind not in ("fold", "dart") and (piece.name, edge.name) not in sewn
+            if edge.kind not in ("fold", "dart") and not edge.as_drawn and (piece.name, edge.name) not in sewn
         }
         self._finish_parts({piece for piece, _ in sewn})
         self._finish_grown_facings()

@@ -32,7 +32,8 @@ def whole_pieces(
         unsewn: whether pieces that no seam joins are kept.
 
     Returns:
-        The whole pieces by name; their seams, without flags for mirrored sides, those of darts among them; notes.
+        The whole pieces by name, each as often as it is cut; their seams, without flags for mirrored sides, those of darts among them;
+        notes.
 
     Raises:
         InputError: a piece has two folds, or a seam names what is not cut.
@@ -53,14 +54,22 @@ def whole_pieces(
         if given[name].quantity % 2 == 0 and others and others <= twice:
             twice.add(name)
     whole = {name: _unfolded(piece) if name in halves else piece for name, piece in given.items() if name in sewn}
+    drawn = {name: name for name in whole}
     for side in sides:
         if side.copy:
             # Where it is worn, no other copy says.
             title = _copy_name(side)
             whole[title] = replace(given[side.piece], name=title, placement=None)
+            drawn[title] = side.piece
     over = {_copy_name(side) for side in sides if side.mirrored} | {name for name in twice if name in sewn}
     for piece in [whole[name] for name in whole if name in over]:
         whole[piece.name + MIRRORED] = replace(turn_over(piece), name=piece.name + MIRRORED)
+        drawn[piece.name + MIRRORED] = drawn[piece.name]
+    for name, piece in whole.items():
+        # What is there more than once shares what is cut of it.
+        if (count := list(drawn.values()).count(drawn[name])) > 1:
+            also = {cloth: max(number // count, 1) for cloth, number in piece.also.items()}
+            whole[name] = replace(piece, quantity=max(piece.quantity // count, 1), paired=False, also=also)
     found: list[Seam] = []
     taken: set[tuple[str, str]] = set()
     # Seams on the other side of the body.

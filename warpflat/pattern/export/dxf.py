@@ -143,7 +143,7 @@ def _lines(
 ) -> list[str]:
     """Return the lines and points of a piece in units of the file, and at its edges, lines and darts their names.
 
-    Below the name of an edge stands what is sewn to it.
+    Below the name of an edge stands its kind, if it is a hem or stays raw, and what is sewn to it.
     """
     block = list[str]()
     corners = np.flatnonzero(_is_corner(piece.cut_line))
@@ -166,7 +166,10 @@ def _lines(
             _polyline(block, line, scale, "8" if edge.kind == "dart" and edge.width == 0 else "14")
             if line is not edge.line:
                 _polyline(block, edge.line, scale, "16")
-        texts = [f"EDGE: {edge.name}", *(f"SEAM: {words}" for words in seams.get((piece.name, edge.name), ()))]
+        # Layers tell folds and darts.
+        kind = [f"KIND: {edge.kind}"] if edge.kind in ("hem", "cut") else []
+        sewn = [f"SEAM: {words}" for words in seams.get((piece.name, edge.name), ())]
+        texts = [f"EDGE: {edge.name}", *kind, *sewn]
         middle = edge.line[len(edge.line) // 2] if len(edge.line) > 2 else edge.line.mean(axis=0)
         for row, text in enumerate(texts):
             _text(block, text, middle - [0.0, NAME * ROW * row], scale, "15", NAME)

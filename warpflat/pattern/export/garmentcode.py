@@ -50,8 +50,8 @@ def garmentcode_json(garment: DraftedGarment, *, size: str | None = None) -> tup
 
     Panels are whole and have no allowance: halves are unfolded, and pairs are there twice. Both sides of a seam are split at the same
     places, since a stitch joins one edge to one: at corners, at the ends of edges, and where one cubic would not keep to the line.
-    `name` of an edge, `grain` and `placed` of a panel, `seam` and `reversed` of a stitch and `open` are the package's own keys, which
-    other programs pass over.
+    `name` of an edge, `seam` and `reversed` of a stitch, `open`, and of a panel `grain`, `placed` and what is cut of it are the
+    package's own keys, which other programs pass over.
 
     Raises:
         InputError: an unknown size, or a piece that cannot be unfolded.
@@ -170,6 +170,7 @@ def _panel(piece: Piece, parts: Sequence[_Split], place: FloatArray) -> dict[str
         "edges": edges,
         "grain": None if piece.grain is None else (CENTIMETRES * (piece.grain - origin)).tolist(),
         "placed": piece.placement is not None,
+        **{key: getattr(piece, key) for key in ("fabric", "quantity", "paired", "also")},
     }
 
 

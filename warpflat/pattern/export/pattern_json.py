@@ -427,7 +427,6 @@ def _piece(piece: DraftedPiece) -> dict[str, Any]:
             allowance=edge.width,
             length=edge.length,
             point_lengths=edge.places.tolist(),
-            mesh_vertices=None if edge.edge.vertices is None else np.asarray(edge.edge.vertices).tolist(),
             **_told(EdgeEntry, edge.curve),
         )
         for edge in piece.edges
@@ -559,7 +558,6 @@ def _read_piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:
             edge,
             points=in_mesh(edge.line),
             allowance=None if edge.kind == "fold" else edge.allowance,
-            vertices=None if edge.mesh_vertices is None else np.array(edge.mesh_vertices, dtype=np.int32),
         )
         for edge in data.edges
     ]

@@ -149,8 +149,9 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
         for kind, row in widths.items()
         if row
     ]
-    told = "Allowances are included: {allowances}. Lay every grain arrow along the selvedge."
-    page.paragraph(translate(told, allowances=", ".join(allowances)))
+    told = "Allowances are included: {allowances}." if allowances else "No allowances are included."
+    grain = translate("Lay every grain arrow along the selvedge.")
+    page.paragraph(f"{translate(told, allowances=', '.join(allowances))} {grain}")
     cloths = cut_list(pieces)
     if len(cloths) > 1:
         page.heading(translate("From each cloth"), (1 + len(cloths)) * LINE)
@@ -161,12 +162,13 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
                 values = {"title": entry.title, "count": entry.quantity, "mirrored": entry.mirrored}
                 cut.append(translate(f"{{title}} {{count}}{how}", **values))
             page.paragraph("; ".join(cut), indent=0.030, lead=translate_name(cloth))
-    page.heading(translate("Sewing order"), 3 * LINE + STEP_HEIGHT)
-    page.paragraph(
-        translate("Right sides together. Letters stand beside the notches; notches with the same letter meet.")
-        + " "
-        + translate("Press each seam when it is sewn, and neaten edges that stay open inside.")
-    )
+    if steps:
+        page.heading(translate("Sewing order"), 3 * LINE + STEP_HEIGHT)
+        page.paragraph(
+            translate("Right sides together. Letters stand beside the notches; notches with the same letter meet.")
+            + " "
+            + translate("Press each seam when it is sewn, and neaten edges that stay open inside.")
+        )
     for number, sewing in enumerate(steps, 1):
         _step(page, number, sewing, [(p, sewing.sewn[p.name]) for p in whole.pieces[size] if p.name in sewing.sewn])
     if seams := sewn_seams(whole, size):

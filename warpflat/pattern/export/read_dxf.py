@@ -284,6 +284,8 @@ def _pieces(
             middles[nearest_line] = np.inf
             layer, points = lines[nearest_line]
             parts.append((last, {_FOLD: "fold", _INNER: "dart", _LEG: "dart"}.get(layer, "seam"), points))
+        elif text in ("KIND: hem", "KIND: cut") and parts:
+            parts[-1] = last, text.removeprefix("KIND: "), parts[-1][2]
         elif text.startswith("SEAM: ") and last:
             sewn.append((last, text.removeprefix("SEAM: ")))
     tips = {text.partition(": ")[2]: at for _, text, at in block.texts if text.startswith(("DART: ", "PLEAT: "))}

@@ -18,7 +18,7 @@ from warpflat.pattern.drafting.piece_parts import Dart, Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.pattern.drafting.polygons import signed_area
 from warpflat.pattern.drafting.seam_difference import SEAM_TOLERANCE
-from warpflat.pattern.export.pattern_json import Coordinate, Ends, Entry, Name, Point, Text
+from warpflat.pattern.export.pattern_json import Coordinate, Count, Ends, Entry, Name, Point, Text
 
 __all__ = ["CENTIMETRES", "LABELS", "EdgeKey", "garmentcode_pattern"]
 
@@ -61,7 +61,7 @@ class PanelEdgeEntry(Entry):
 class PanelEntry(Entry):
     """A panel: its outline in its own plane, and the way from there to the body; angles in degrees about x, y, z in turn.
 
-    `grain` and `placed` are the package's own keys; the latter is false where the place is a guess.
+    The keys from `grain` on are the package's own, as :class:`Piece` has them; `placed` is false where the place is a guess.
     """
 
     translation: Annotated[list[Coordinate], Field(min_length=3, max_length=3)] = [0.0, 0.0, 0.0]  # noqa: RUF012
@@ -71,6 +71,10 @@ class PanelEntry(Entry):
     label: Text = ""
     grain: Ends | None = None
     placed: bool = True
+    fabric: Text = ""
+    quantity: Count = 1
+    paired: bool = True
+    also: dict[Text, Count] = Field(default_factory=dict)
 
 
 class StitchSideEntry(Entry):
@@ -123,7 +127,9 @@ Partners = dict[EdgeKey, tuple[EdgeKey, bool, str]]
 
 @dataclass(eq=False)
 class _Panel:
-    """A panel as it is read: the lines of its edges (#P by 2 [m]) with their own names, its place, and its darts' legs by number."""
+    """A panel as it is read: the lines of its edges (#P by 2 [m]) with their own names, its place, what is cut of it, and its darts'
+    legs by number.
+    """
 
     key: str
     lines: list[FloatArray]
@@ -132,6 +138,7 @@ class _Panel:
     placement: FloatArray | None
     at: str
     grain: FloatArray | None
+    cut: dict[str, Any]
     darts: list[tuple[list[int], list[int], str]] = field(default_factory=list)
 
     @property
@@ -228,6 +235,7 @@ def garmentcode_pattern(data: Any, name: str) -> Pattern:
                 grain=panel.grain,
                 placement=panel.placement,
                 levels=levels,
+                **panel.cut,
             )
         )
     return Pattern(name=name, pieces={"": pieces}, seams=_seams(chains, panels, named))
@@ -281,6 +289,7 @@ def _read_panel(key: str, entry: PanelEntry, properties: PropertiesEntry) -> _Pa
         placement=placement if entry.placed else None,
         at=at if entry.placed else "",
         grain=None if entry.grain is None else np.array(entry.grain) @ way / properties.units_in_meter,
+        cut={key: getattr(entry, key) for key in ("fabric", "quantity", "paired", "also")},
     )
 
 

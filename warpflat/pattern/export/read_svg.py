@@ -151,7 +151,8 @@ def _own_piece(
         elif role == "cut":
             cutting.append(line.path)
         elif role in _KINDS and edge:
-            parts.append((edge, _KINDS[role], line.path))
+            kind = "cut" if element.get("data-kind") == "cut" else _KINDS[role]
+            parts.append((edge, kind, line.path))
             sewn = [text.strip() for text in element.get("data-seam", "").split("\n")]
             words.setdefault(size, []).extend((name, edge, text) for text in sewn if text)
         elif role in _KINDS:

@@ -51,7 +51,7 @@ def write_svg(garment: DraftedGarment, path: str | os.PathLike[str], *, sizes: S
 
     Groups are called "PIECE-SIZE"; in them the cut line is "PIECE-SIZE.cut" and every edge "PIECE-SIZE.EDGE" (what
     an id may not hold becomes "_"; the plain names stand in `data-piece`, `data-size` and `data-edge`). What is sewn to an edge stands
-    in its `data-seam`.
+    in its `data-seam`; that it stays raw, in its `data-kind`.
 
     Args:
         garment: drafted.
@@ -138,8 +138,11 @@ class SvgPage:
         about = {"data-piece": piece.name, "data-size": piece.size, "data-quantity": str(piece.piece.quantity)}
         group = ET.SubElement(self.root, "g", {"id": key, **about})
         colour = None if hue is None else SIZE_COLOURS[hue % len(SIZE_COLOURS)]
+        raw = {edge.name for edge in piece.edges if edge.kind == "cut"}
         for stroke in drawing.strokes:
             self.stroke(group, stroke, key, matrix, colour)
+            if stroke.role in _SEWN and stroke.name in raw:
+                group[-1].set("data-kind", "cut")
             if stroke.role in _SEWN and (sewn := (seams or {}).get((piece.name, stroke.name))):
                 group[-1].set("data-seam", "\n".join(sewn))
         for words in drawing.words:
