@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from flat_forms import flat_form
+from flat_forms import flat_form, pattern_of
 
 from warpflat.garment.construction.details import FinishingTable, OpeningTable
 from warpflat.garment.construction.garment import Garment
@@ -80,6 +80,32 @@ def test_ruffle_hangs_below_its_edge_with_its_folds(wish: FinishingTable, wider:
         # Folds of the near side alone are seen.
         seen = [sum(len(piece.lines) for piece in row[name]) for row in (plain, drawn)]
         assert seen[1] - seen[0] == pytest.approx(lines, abs=2)
+
+
+@pytest.mark.parametrize("kind", ["band", "ruffle", "flounce"])
+def test_what_is_sewn_to_a_slanted_edge_hangs_from_it(kind: str):
+    rise = {"side left": 100.0, "side right": 0.0}
+    garment = flat_form("skirt")
+    hem = FinishingTable(kind="hem", edge="knee", shorten_mm=rise)
+    wish = FinishingTable(kind=kind, edge="knee", width_mm=50, shorten_mm=rise)
+    plain, drawn = (pattern_of(garment, each).worn.views for each in (hem, wish))
+    for name, sign in (("front", 1.0), ("back", -1.0)):
+        before, after = (
+            np.concatenate([ring for piece in row[name] for ring in piece.outlines]) * [sign, 1.0]
+            for row in (plain, drawn)
+        )
+        for x in (0.1, 0.0, -0.1):
+            lowest = [float(row[np.abs(row[:, 0] - x) < 0.03, 1].min()) for row in (before, after)]
+            assert lowest[0] - lowest[1] == pytest.approx(0.05, abs=0.02), (name, x)
+
+
+def test_a_cuff_that_is_wider_than_what_it_takes_the_place_of_ends_lower():
+    rows = [
+        pattern_of(flat_form("skirt"), FinishingTable(kind="band", edge="knee", width_mm=60, shorten_mm=mm)).worn
+        for mm in (60.0, 20.0)
+    ]
+    lowest = [min(float(ring[:, 1].min()) for piece in row.views["front"] for ring in piece.outlines) for row in rows]
+    assert lowest[0] - lowest[1] == pytest.approx(0.04, abs=0.005)
 
 
 def test_right_half_of_a_wrap_covers_the_left_one():

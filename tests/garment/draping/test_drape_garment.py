@@ -318,6 +318,13 @@ def test_a_corrected_pattern_halves_the_misfit_and_keeps_its_seams():
     np.testing.assert_allclose(again.positions, found.after.positions, atol=1e-9)
 
 
+def test_a_pattern_is_not_corrected_from_another_cloth_that_is_not_at_rest(worn: warpflat.Drape):
+    hurried = dataclasses.replace(worn, options=warpflat.DrapeOptions(max_steps=100))
+    for other in ({"fabric": find_fabric("denim")}, {"worn_shape": True, "fabric": find_fabric("denim")}):
+        with pytest.raises(InputError, match="the drape in denim is not at rest"):
+            warpflat.correct_pattern(hurried, rounds=0, **other)
+
+
 class _Cylinder:
     """The gaps from an upright cylinder, in the place of a body's mesh."""
 

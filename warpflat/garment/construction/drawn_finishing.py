@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import BoolArray, FloatArray, arc_lengths, line_name, unit
+from warpflat.core import BoolArray, FloatArray, arc_lengths, line_name, other_side, unit
 from warpflat.flat import triangulate, vertex_normals
 from warpflat.garment.mannequin.slicer import UP
 from warpflat.pattern import ViewedPiece
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from warpflat.garment.construction.details import FinishingTable
     from warpflat.garment.construction.form_garment import FormGarment
 
-__all__ = ["finishing_views"]
+__all__ = ["Rises", "finishing_views", "rise_along"]
 
 # Ends of edges that are nearer than this are sewn to each other [m]; points of a chain lie so far apart.
 _MEET, _STEP = 0.012, 0.004
@@ -38,6 +38,10 @@ _FOLD_FROM, _GATHER_TO = 0.35, 0.4
 _BOUND, _PLACKET = 0.008, 0.014
 # A hood: height above the neck and half of its width, as shares of the length of the neck edge, and where the neck widens into it.
 _HOOD_HIGH, _HOOD_WIDE, _HOOD_NECK = 0.72, 0.27, 0.35
+
+
+#: By piece and edge the lengths along the edge from its start, and how wide a strip is cut off there [m].
+Rises = Mapping[tuple[str, str], tuple[FloatArray, FloatArray]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,19 +83,26 @@ class _Sheet:
     outlined: bool = True
 
 
-def finishing_views(garment: FormGarment, sign: float) -> tuple[list[ViewedPiece], list[ViewedPiece]]:
+def rise_along(garment: FormGarment, piece: str, edge: str, rises: Rises) -> FloatArray:
+    """Return how wide a strip slanted edges lose at each vertex of an edge [m]."""
+    # Of a pair the left piece is drawn, which runs the other way.
+    turned = (piece, edge) not in rises
+    arc, wide = rises.get((other_side(piece), other_side(edge)) if turned else (piece, edge), ((0.0,), (0.0,)))
+    at = arc_lengths(garment.positions[piece][garment.form.pieces[piece].edges[edge]])
+    return np.interp(at[-1] - at if turned else at, arc, wide)
+
+
+def finishing_views(garment: FormGarment, sign: float, rises: Rises) -> tuple[list[ViewedPiece], list[ViewedPiece]]:
     """Return the finishing pieces of a form as they are seen: what lies behind all other pieces, and what lies before them.
 
     Args:
         garment: on its body.
         sign: 1 from the front, -1 from the back.
+        rises: of its slanted edges.
     """
     behind, before = list[ViewedPiece](), list[ViewedPiece]()
     for wish in garment.finishing:
-        if isinstance(wish.shorten, Mapping):
-            # The slanted hem itself is drawn.
-            continue
-        for chain in _chains(garment, wish.edge):
+        for chain in _chains(garment, wish.edge, rises):
             for sheet in _sheets(wish, chain):
                 near = sign * sheet.out[:, 2] > 0.0
                 if sheet.outlined:
@@ -129,20 +140,21 @@ def _seen(sheet: _Sheet, shown: BoolArray, sign: float, *, lines: bool) -> list[
     return found
 
 
-def _chains(garment: FormGarment, called: str) -> Iterator[_Chain]:
-    """Yield the edges of a name, joined where they meet in space."""
+def _chains(garment: FormGarment, called: str, rises: Rises) -> Iterator[_Chain]:
+    """Yield the edges of a name, as high as slanted ones lie, joined where they meet in space."""
     form = garment.form
     rows = list[tuple[FloatArray, FloatArray, FloatArray]]()
-    for piece in form.pieces.values():
+    for name, piece in form.pieces.items():
         surface = piece.surface
         triangles, _ = triangulate(surface.faces)
         normals = vertex_normals(surface.vertices, triangles)
         for edge, ids in piece.edges.items():
             if line_name(edge) != called:
                 continue
-            points, out = surface.vertices[ids], normals[ids]
+            out, away = normals[ids], surface.vertices[ids] - surface.vertices.mean(axis=0)
+            points = surface.vertices[ids] + np.outer(rise_along(garment, name, edge, rises), UP)
             beyond = unit(np.cross(np.gradient(points, axis=0), out))
-            if ((points - surface.vertices.mean(axis=0)) * beyond).sum() < 0.0:
+            if (away * beyond).sum() < 0.0:
                 beyond = -beyond
             rows.append((points, out, beyond))
             if form.half:
@@ -178,8 +190,10 @@ def _sheets(wish: FinishingTable, chain: _Chain) -> Iterator[_Sheet]:
     """Yield what is drawn of a finishing along one chain."""
     columns = np.arange(len(chain.points), dtype=float)
     level = unit(chain.out * [1.0, 0.0, 1.0])
+    if isinstance(wish.shorten, float):
+        chain = replace(chain, points=chain.points - wish.shorten * chain.beyond)
     if wish.kind in ("waistband", "band", "cuff"):
-        width = -wish.width if wish.shaped or wish.shorten else wish.width
+        width = -wish.width if wish.shaped else wish.width
         yield _Sheet(rows=np.stack([chain.points, chain.points + width * chain.beyond]), out=chain.out)
     elif wish.kind in ("casing", "binding"):
         line = chain.points - (_BOUND if wish.kind == "binding" else wish.width) * chain.beyond
@@ -195,22 +209,22 @@ def _sheets(wish: FinishingTable, chain: _Chain) -> Iterator[_Sheet]:
 def _falling(wish: FinishingTable, chain: _Chain, columns: FloatArray, level: FloatArray) -> _Sheet:
     """Return a ruffle or flounce as it falls from its edge: with pleats, gathers or folds."""
     arc = arc_lengths(chain.points)
-    shorten = wish.shorten if isinstance(wish.shorten, float) else 0.0
-    start = chain.points - shorten * chain.beyond
     out = {True: _PLEATS_OUT, False: min(_MOST_OUT, _GATHERS_OUT * wish.share)}[bool(wish.pleat)]
     folds = max(2, round(arc[-1] / (wish.pleat or _GATHER_STEP)))
     if wish.kind == "flounce":
         out, folds = min(_MOST_OUT, _FLOUNCE_OUT * wish.turns), max(4, round(_FOLDS_A_TURN * wish.turns))
-    hem = start + wish.width * unit(chain.beyond + out * level)
+    hem = chain.points + wish.width * unit(chain.beyond + out * level)
     if not wish.pleat:
         hem = hem + _WAVE * np.sin(2.0 * np.pi * folds * arc / arc[-1])[:, None] * chain.beyond
     lines = []
     for place in (np.arange(folds) + 0.25) * arc[-1] / folds:
         column = float(np.interp(place, arc, columns))
-        high, low = (np.array([np.interp(column, columns, row[:, axis]) for axis in range(3)]) for row in (start, hem))
+        high, low = (
+            np.array([np.interp(column, columns, row[:, axis]) for axis in range(3)]) for row in (chain.points, hem)
+        )
         share = [0.0, 1.0] if wish.pleat else [0.0, _GATHER_TO] if wish.kind == "ruffle" else [_FOLD_FROM, 1.0]
         lines.append((high + np.outer(share, low - high), np.full(2, column)))
-    return _Sheet(rows=np.stack([start, hem]), out=chain.out, lines=tuple(lines))
+    return _Sheet(rows=np.stack([chain.points, hem]), out=chain.out, lines=tuple(lines))
 
 
 def _collar(wish: FinishingTable, chain: _Chain, level: FloatArray) -> Iterator[_Sheet]:

@@ -14,7 +14,7 @@ import numpy as np
 from warpflat.core import FloatArray, IntArray, arc_lengths, other_side, points_at_lengths, unit, without_side
 from warpflat.flat import area_vectors, border_loops, judge, triangulate, vertex_normals
 from warpflat.garment.construction.button_stand import button_depths
-from warpflat.garment.construction.drawn_finishing import finishing_views
+from warpflat.garment.construction.drawn_finishing import Rises, finishing_views, rise_along
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.mark_openings import TIE_WIDTH
 from warpflat.garment.construction.openings import place_opening
@@ -46,10 +46,6 @@ _TIE_HANGS, _TIES = 0.22, (-0.25, 0.2)
 _CIRCLE = np.column_stack([f(np.linspace(0.0, 2.0 * np.pi, 17)) for f in (np.cos, np.sin)])
 
 
-#: By piece and edge the lengths along the edge from its start, and how wide a strip is cut off there [m].
-Rises = Mapping[tuple[str, str], tuple[FloatArray, FloatArray]]
-
-
 def describe_worn(
     garments: Mapping[str, Garment], sample: str, rises: Rises = MappingProxyType({}), pieces: Sequence[Piece] = ()
 ) -> Worn:
@@ -73,7 +69,7 @@ def describe_worn(
         if on_form is not None:
             names = [list(garment.pieces)[k] for k in order]
             seen = [_with_slanted_hems(on_form, *each, sign, rises) for each in zip(names, seen, strict=True)]
-            behind, before = finishing_views(on_form, sign)
+            behind, before = finishing_views(on_form, sign, rises)
             seen = [*behind, *_wrapped(on_form, seen, names, sign), *before, *_openings(on_form, sign)]
             seen += _pockets(on_form, pieces, sign)
         views[name] = tuple(piece for piece in seen if piece.outlines or piece.lines)
@@ -122,13 +118,9 @@ def _with_slanted_hems(garment: FormGarment, name: str, view: ViewedPiece, sign:
     import shapely
 
     for edge, ids in garment.form.pieces[name].edges.items():
-        # Of a pair the left piece is drawn, which runs the other way.
-        turned = (name, edge) not in rises
-        arc, wide = rises.get((other_side(name), other_side(edge)) if turned else (name, edge), ((), ()))
-        if len(arc) == 0:
+        rise = rise_along(garment, name, edge, rises)
+        if not rise.any():
             continue
-        at = arc_lengths(garment.positions[name][ids])
-        rise = np.interp(at[-1] - at if turned else at, arc, wide)
         low = garment.pieces[name].surface.vertices[ids, :2] * [sign, 1.0]
         high = low + np.outer(rise, [0.0, 1.0])
         # Out beyond the silhouette, which curves in between.

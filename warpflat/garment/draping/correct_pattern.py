@@ -168,10 +168,10 @@ def correct_pattern(
         callback: called with the number of each round and its misfit.
 
     Raises:
-        InputError: the drape is not at rest.
+        InputError: the drape is not at rest, or that of another cloth or shape.
+        StepError: another cloth falls off.
     """
-    if not drape.converged:
-        raise InputError("correct: the drape is not at rest; raise max_steps in [drape]")
+    _check_rest(drape)
     bridging, device, held = not worn_shape, drape.body.device, held_vertices(drape.cloth, hold)
     shape = drape.positions if worn_shape else drape.cloth.designed
     cloth = replace(drape.cloth, designed=shape, fabric=fabric or drape.cloth.fabric)
@@ -183,6 +183,7 @@ def correct_pattern(
 
     if worn_shape or fabric is not None:
         drape = wear(cloth)
+        _check_rest(drape)
     before = drape
     seams = seam_edges(cloth)
     difference = seam_differences(cloth.flat, seams)
@@ -217,6 +218,12 @@ def correct_pattern(
     return Correction(before=before, after=drape, rounds=tuple(history), reason=reason)
 
 
+def _check_rest(drape: Drape) -> None:
+    drape.worn.check_held()
+    if not drape.converged:
+        raise InputError(f"correct: the drape in {drape.cloth.fabric.name} is not at rest; raise max_steps in [drape]")
+
+
 def _round(drape: Drape, share: float, bridging: bool) -> Round:
     strained = float(drape.face_areas[drape.demand.held].sum() / drape.face_areas.sum())
     off = drape.misfit if bridging else drape.distance
@@ -240,8 +247,7 @@ def relieve_pattern(drape: Drape, *, hold: Sequence[str] = (), rounds: int = 6) 
     Raises:
         InputError: the drape is not at rest.
     """
-    if not drape.converged:
-        raise InputError("correct: the drape is not at rest; raise max_steps in [drape]")
+    _check_rest(drape)
     held, limit = held_vertices(drape.cloth, hold), drape.cloth.fabric.strain_limit
     seams = seam_edges(drape.cloth)
     difference = seam_differences(drape.cloth.flat, seams)
