@@ -26,7 +26,6 @@ from .cells import (
     STEP,
     CellForces,
     Cells,
-    add_drag,
     add_forces,
     add_stiffness,
     cell_corner,
@@ -81,7 +80,7 @@ def evaluate_face(
             area = wp.float64(0.5) * det * cell_weight(face)
             energy += area * cell.law.energy
             if wanted != ENERGY:
-                add_forces(out, slot, at, membrane_forces(cell) * area)
+                add_forces(out.force, slot, at, membrane_forces(cell) * area)
             if wanted == STEP:
                 none = wp.float64(0.0)
                 held = natural(3 * (begin + k))
@@ -93,7 +92,7 @@ def evaluate_face(
                 add_stiffness(out, slot, at, wp.float64(2.0) * beyond)
                 if viscous:
                     V = membrane_viscosity(cell, velocity[corner[0]], velocity[corner[1]], velocity[corner[2]], cloth)
-                    add_drag(out, slot, at, V * (area * time_step))
+                    add_forces(out.viscosity, slot, at, V * (area * time_step))
         else:
             energy = wp.float64(wp.inf)
         k += 1

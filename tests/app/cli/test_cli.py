@@ -529,7 +529,7 @@ def test_a_size_takes_measures_of_ones_own(command: Command):
     ("arguments", "words"),
     [
         (["--measure", "bust=0.9", "--measure", "bust=0.92"], "--measure bust is given twice, 0.9 and 0.92"),
-        (["--measure", "bust=nan"], "is not NAME=METRES"),
+        (["--measure", "bust=nan"], "is not NAME=LENGTH"),
         (["--size", "EU 38", "--table", "men"], "size 'EU 38' is completed by the table 'women', not by 'men'"),
         (["--table", "women"], "give the body in one way: --size or --measure, or both"),
         (["--scan", "body.obj", "--size", "EU 38"], "give the body in one way: --size or --measure, or both"),

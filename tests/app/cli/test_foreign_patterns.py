@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import ezdxf
 import pytest
 from command import Command
+from polygons import corners_of, drafted, polygon, sewn
 
+from warpflat.pattern.export.pattern_json import write_pattern_json
 from warpflat.pattern.export.read_pattern import read_pattern
 
 DRAWING = """<svg xmlns="http://www.w3.org/2000/svg" width="500mm" height="400mm" viewBox="0 0 500 400">
@@ -91,4 +94,12 @@ def test_a_marker_of_a_file(command: Command, half: Path) -> None:
 )
 def test_a_marker_that_cannot_be_is_one_line(command: Command, half: Path, more: tuple[str, ...], message: str) -> None:
     assert message in command("marker", f"{half}", *more).refusal
+    assert not Path("out").exists()
+
+
+def test_a_seam_to_be_matched_that_is_not_there_leaves_no_marker_of_another_cloth(command: Command) -> None:
+    pieces = [replace(polygon(name, corners_of(0.2, 0.3)), fabric=name) for name in ("wool", "cotton")]
+    write_pattern_json(drafted(*pieces, seams=[sewn("wool.e1", "cotton.e3", "side left")]), "pattern.json")
+    asked = ("--repeat-warp", "40", "--match", "side lft", "--seconds", "1", "--out", "out")
+    assert "no seam 'side lft'; did you mean 'side left'" in command("marker", "pattern.json", *asked).refusal
     assert not Path("out").exists()

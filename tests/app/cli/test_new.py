@@ -44,6 +44,7 @@ def test_scene_is_written_with_what_was_chosen(capsys: pytest.CaptureFixture[str
     ("arguments", "message"),
     [
         (["shrt", "--size", "EU 38"], "did you mean 'shirt'"),
+        (["skirt", "--size", "EU 38"], "'skirt' is unknown: valid: circle_skirt, gored_skirt, pencil_skirt"),
         (["shirt", "--size", "EU 38", "--collar", "stnd"], "did you mean 'stand'"),
         (["shirt", "--size", "EU 38", "--colar", "stand"], "did you mean 'collar'"),
         (["shirt", "--size", "EU 99"], "EU 99"),

@@ -118,7 +118,7 @@ def test_length_share_before_start_is_named(tmp_path: Path):
     (tmp_path / "x.toml").write_text(text)
     with pytest.raises(
         InputError,
-        match=r"openings\[0\]: length_share = 0.1 ends \d+ mm along 'crotch back', and start_mm begins at 200",
+        match=r"^\S+\.toml: openings\[0\]: length_share = 0.1 ends \d+ mm along 'crotch back', and start_mm begins at 200",
     ):
         plan_garment(load_scene(tmp_path / "x.toml"))
 

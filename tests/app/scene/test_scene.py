@@ -128,6 +128,7 @@ DOME = "[surface]\nshape = 'dome'\n"
     ("text", "message"),
     [
         ("", r"is empty; a scene needs at least a \[surface\] table"),
+        ("scenes = ['dome.toml']\n", r"\.toml: is a batch of scenes: warpflat batch \S+\.toml runs it$"),
         ("name = 'x'\nname = 'y'\n", r"is not valid TOML: Cannot overwrite a value \(at line 2"),
         ("fabric = 'woven'\n", r"a scene needs either a \[surface\] table or a \[mannequin\] table with a form"),
         ("[mannequin]\nsize = 'EU 38'\n", r"a mannequin and a form go together"),

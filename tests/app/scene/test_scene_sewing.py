@@ -87,6 +87,10 @@ def test_the_console_is_a_line_each_and_none_is_wide(skirt):
     assert len(lines) <= 5
     assert heads[0] == result.metrics["verdict"]["words"]
     assert heads[-1] == "out"
+    # A path can be pasted, whatever is in it.
+    *_, printed, listed = summary_lines(result.metrics, [*result.files, "pattern.pdf"], "my out")
+    assert printed == "print 'my out/pattern.pdf'"
+    assert listed.startswith("'my out': ")
     assert max(map(len, lines)) <= 100
     assert "-0.0" not in " ".join(lines)
     guessed = sum("guess" not in note and " cm is " in note for note in result.notes)

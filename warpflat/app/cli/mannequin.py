@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from warpflat.app.cli.options import DONE, ComputingCommand, tell
+from warpflat.app.cli.options import DONE, ComputingCommand, measure_option, tell
 from warpflat.app.cli.run import start_warp_silently
 from warpflat.core import InputError, require_memory_for_usd
 
@@ -18,7 +18,7 @@ __all__ = ["mannequin", "read_lengths"]
 
 @click.command(cls=ComputingCommand)
 @click.option("--size", metavar="SIZE", help='Of a size table: "EU 38", "UK 10", "US 8", "JIS 9AR", "men 50".')
-@click.option("--measure", "measures", multiple=True, metavar="NAME=METRES", help="A measurement, such as bust=0.88.")
+@measure_option()
 @click.option(
     "--table",
     type=click.Choice(["women", "men", "children"]),
@@ -105,7 +105,7 @@ def mannequin(
 
 
 def read_lengths(texts: Sequence[str], option: str) -> dict[str, float]:
-    """Return the lengths of all NAME=METRES, each name once."""
+    """Return the lengths of all NAME=LENGTH, each name once."""
     found: dict[str, float] = {}
     for text in texts:
         name, equals, value = (part.strip() for part in text.partition("="))
@@ -115,7 +115,7 @@ def read_lengths(texts: Sequence[str], option: str) -> dict[str, float]:
             metres = math.nan
         if not math.isfinite(metres):
             shown = f"{name}=0.88" if equals else "bust=0.88"
-            raise InputError(f"command line: {option} {text!r} is not NAME=METRES, such as {shown}")
+            raise InputError(f"command line: {option} {text!r} is not NAME=LENGTH, such as {shown}")
         if name in found:
             raise InputError(
                 f"command line: {option} {name} is given twice, {found[name]:g} and {metres:g}; give it once"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from warpflat.app.cli.options import DONE
+from warpflat.app.cli.options import DONE, measure_option
 from warpflat.core import InputError
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ __all__ = ["new"]
 @click.command(context_settings={"ignore_unknown_options": True})
 @click.argument("words", nargs=-1, type=click.UNPROCESSED, metavar="[GARMENT] [--CHOICE OPTION]...")
 @click.option("--size", metavar="SIZE", help='Of a size table: "EU 38", "US 8", "men 50".')
-@click.option("--measure", "measures", multiple=True, metavar="NAME=METRES", help="A measurement, such as bust=0.88.")
+@measure_option()
 @click.option("--scan", type=click.Path(path_type=Path), metavar="FILE", help="The mesh of a standing body.")
 @click.option("--fabric", metavar="NAME", help="Another cloth than the garment's own.")
 @click.option(

@@ -22,6 +22,7 @@ __all__ = [
     "RUN_FILES",
     "ComputingCommand",
     "Output",
+    "measure_option",
     "output_options",
     "scene_option",
     "scene_options",
@@ -64,6 +65,12 @@ def _check_shear_limit(_: click.Context, __: click.Parameter, value: float | Non
     if value is not None:
         check_value("shear_limit", value, "--shear-limit")
     return value
+
+
+def measure_option() -> Callable[[Command], Command]:
+    """Return the option of measurements of the body."""
+    words = "A measurement in metres, such as bust=0.88; what can only be centimetres or millimetres is read as such."
+    return click.option("--measure", "measures", multiple=True, metavar="NAME=LENGTH", help=words)
 
 
 def scene_option(key: str, *, help: str = "") -> Callable[[Command], Command]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from warpflat.app.cli.tables import cut_words
-from warpflat.app.scene.found_seams import NO_PATTERN
 from warpflat.core import energy_words, format_count
-from warpflat.garment import LACKING
+from warpflat.garment import LACKING, NO_PATTERN
 
 __all__ = ["notes_line", "summary_lines"]
 
@@ -84,9 +84,9 @@ def summary_lines(
     if metrics.get("garment", {}).get("no_pattern"):
         lines.append("no pattern yet")
     elif "pattern.pdf" in files:
-        lines.append(f"print {folder}/pattern.pdf")
+        lines.append(f"print {shlex.quote(f'{folder}/pattern.pdf')}")
     ordered = sorted(files, key=lambda name: _OPENED_FIRST.index(name) if name in _OPENED_FIRST else len(_OPENED_FIRST))
-    return [*(_clipped(line, width) for line in lines if line), _listed(f"{folder}: ", ordered, width)]
+    return [*(_clipped(line, width) for line in lines if line), _listed(f"{shlex.quote(folder)}: ", ordered, width)]
 
 
 def notes_line(notes: Sequence[str]) -> str:

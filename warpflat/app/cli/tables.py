@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
@@ -119,7 +120,7 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
         tables.append(f"cut from {'; '.join(parts)}")
     if taken := metrics.get("pattern_of_file"):
         tables.append(f"pattern: {cut_words(taken)}")
-    return "\n\n".join(tables) + f"\n{folder}: {', '.join(files)}"
+    return "\n\n".join(tables) + f"\n{shlex.quote(folder)}: {', '.join(files)}"
 
 
 def cut_words(taken: Mapping[str, Any]) -> str:
@@ -131,7 +132,7 @@ def cut_words(taken: Mapping[str, Any]) -> str:
 
 
 def _price(joules: float | None) -> str:
-    return "" if joules is None else energy_words(joules, 3)
+    return "" if joules is None else energy_words(joules)
 
 
 def drape_lines(metrics: Mapping[str, Any]) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -79,6 +80,8 @@ def load_scene(path: str | Path) -> Scene:
         raise InputError(
             f'{path}: is empty; a scene needs at least a [surface] table with file = ... or shape = "dome"'
         )
+    if not {"scenes", "forms", "tasks"}.isdisjoint(data):
+        raise InputError(f"{path}: is a batch of scenes: warpflat batch {shlex.quote(str(path))} runs it")
     scene = make_scene(data, name=path.stem, folder=path.parent, where=str(path))
     return replace(scene, sources=(path.absolute(),))
 

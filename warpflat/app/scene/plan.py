@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from warpflat.app.scene.cuts import CutSequence, cut_of_dart, plan_automatic_cuts, plan_cuts
 from warpflat.app.scene.form import scene_form, scene_mannequin
-from warpflat.app.scene.found_seams import found_seams, plain_panel, seams_entry
+from warpflat.app.scene.found_seams import found_seams, plain_panel
 from warpflat.app.scene.frames import FrameRecorder
 from warpflat.app.scene.load import (
     Scene,
@@ -24,7 +24,7 @@ from warpflat.app.scene.pattern_options import pattern_options
 from warpflat.app.scene.schema import PieceTable
 from warpflat.app.scene.seams import scene_constraints, scene_surface_seams, scene_wishes
 from warpflat.app.scene.surface import scene_pieces, scene_sewn_panels, scene_surface, with_piece_tables
-from warpflat.core import InputError, StepError, optional_step, report_activity
+from warpflat.core import InputError, StepError, optional_step, report_activity, without_side
 from warpflat.flat import (
     Flattening,
     Progress,
@@ -270,7 +270,7 @@ class MeshPlan(Plan):
         """See :meth:`Plan.further_metrics`: the seams that were found."""
         if self.found is None:
             return {}
-        return {"garment": seams_entry(self.found, list(garment.pieces.values()), self.drawing.rules.seam)}
+        return {"garment": self.found.entry(list(garment.pieces.values()), self.drawing.rules.seam)}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -353,7 +353,7 @@ class GarmentPlan(Plan):
         on_fold = () if cloth.fold is None else cloth.grid_vertices[cloth.edges[cloth.fold]].tolist()
         for remedy in advised.remedies:
             row = cloth.grid_vertices[remedy.path]
-            title = remedy.words.split(",")[0].removeprefix("a ").removesuffix(" left").removesuffix(" right")
+            title = without_side(remedy.words.split(",")[0].removeprefix("a "))
             dart = dart_along(self.mannequin.layout, self.form.vertices, self.bricks[name], row, piece=name, name=title)
             table = None if dart is None or row[-1] in on_fold else cut_of_dart(dart)
             remedies.append(replace(remedy, table=table))
@@ -388,7 +388,8 @@ class GarmentPlan(Plan):
             if size != self.size:
                 with errors_named(f"{self.scene.where}: pattern.sizes"):
                     body, form = scene_form(self.scene, scene_mannequin(self.scene, size=size))
-                found[size] = replace(self, mannequin=body, form=form, openings=_sized_openings(self.scene, form))
+                    openings = _sized_openings(self.scene, form)
+                found[size] = replace(self, mannequin=body, form=form, openings=openings)
         return found
 
 
@@ -540,7 +541,7 @@ def _sized_openings(scene: Scene, form: FormResult) -> list[OpeningTable]:
         if scene.settings.cloth is not None and scene.settings.cloth.lining:
             # A lining is sewn to the inner edges of the facings of button stands.
             opening = opening.model_copy(update={"facing": opening.facing or "separate"})
-        with errors_named(f"{scene.where}: openings[{number}]"):
+        with errors_named(f"openings[{number}]"):
             found.append(sized_opening(form, opening, on_form))
     return found
 
@@ -561,9 +562,10 @@ def plan_garment(
     settings, options = scene.settings, flatten_options(scene, device)
     report_activity("building the mannequin")
     mannequin, form = built or scene_form(scene)
+    with errors_named(scene.where):
+        openings = _sized_openings(scene, form)
     with errors_named(f"{scene.where}: pattern"):
         drawing = pattern_options(settings.pattern, settings.marker, settings.cloth)
-        openings = _sized_openings(scene, form)
         if settings.half:
             drawing = replace(drawing, rules=sewn_centres(drawing.rules, openings))
         plan = plan_form(form, drawing.rules)

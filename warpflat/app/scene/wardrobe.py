@@ -73,7 +73,10 @@ def garment_offer(name: str) -> GarmentOffer:
     """
     known = name.replace("-", "_").lower()
     if known not in offers():
-        raise InputError(f"garment {name!r} is unknown: {nearest(known, offers())}")
+        kinds = [each for each in offers() if known in each.split("_")]
+        raise InputError(
+            f"garment {name!r} is unknown: " + (f"valid: {', '.join(kinds)}" if kinds else nearest(known, offers()))
+        )
     return offers()[known]
 
 

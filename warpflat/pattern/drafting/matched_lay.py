@@ -36,6 +36,17 @@ class Stripes:
         """Repeats along and across the cloth [m]."""
         return np.array([self.warp, self.weft])
 
+    def check_seams(self, garment: DraftedGarment) -> None:
+        """Check that a garment has the seams at which they meet.
+
+        Raises:
+            InputError: it lacks one; gives the nearest.
+        """
+        known = [seam.name for seam in garment.garment.seams]
+        for name in self.seams:
+            if name not in known:
+                raise InputError(f"match: no seam {name!r}; {nearest(name, known)}")
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Laid:
@@ -66,6 +77,7 @@ def lay_by_rule(
     Raises:
         InputError: a seam to be matched does not exist, or a piece is too wide.
     """
+    stripes.check_seams(garment)
     repeat = stripes.repeat
     cell = np.where(repeat > 0.0, repeat / np.maximum(1, np.ceil(repeat / CELL)), CELL)
     phases = _phases(copies, _matched_points(copies, stripes.seams, garment))
@@ -119,8 +131,6 @@ def _matched_points(
     known = {seam.name: seam for seam in garment.garment.seams}
     points = []
     for name in seams:
-        if name not in known:
-            raise InputError(f"match: no seam {name!r}; {nearest(name, known)}")
         joined: dict[int, FloatArray] = {}
         for side in (row[0] for row in known[name].sides):
             for k, copy in enumerate(copies):

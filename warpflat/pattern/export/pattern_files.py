@@ -201,6 +201,7 @@ def lay_markers(
         InputError: there is no pattern, an unknown size or seam, no piece can be laid, or the folder cannot be written.
     """
     with _rewritten(source, out, allowance, None, over_itself=False) as (drafted, folder, name, files):
+        cloth.stripes.check_seams(drafted)
         marked, remarks, plans = _marker(drafted, folder, name, cloth, seconds, sizes)
         files += marked
         if all("not_made" in plan for plan in plans):
@@ -405,7 +406,7 @@ def _write(
         lengths = "english" if english else "metric"
         write_dxf(drafted, file, dialect=dialect, units=lengths, sizes=sizes, rul=file_in(folder, name, ".rul"))
     elif kind == "svg":
-        write_svg(drafted, file, sizes=sizes, nested=True)
+        write_svg(drafted, file, sizes=sizes)
     elif kind == "pdf":
         write_pdf(drafted, file, paper=paper, sizes=sizes)
     elif kind == "plt":
