@@ -195,7 +195,8 @@ def second_derivative(cell: WornCell, cloth: Cloth):
     """Return the second derivative of det(I + A) psi(F (I + A)^-1) by A = du/dx at A = 0, rows and columns A00, A01, A10, A11 [N/m].
 
     With S = F^T P, P = d(psi)/dF, it is, for A along B, that of psi by the worn threads, - tr A (S : B) - tr B (S : A)
-    + tr(S^T (A B + B A)) + psi (tr A tr B - tr(A B)).
+    + tr(S^T (A B + B A)) + psi (tr A tr B - tr(A B)). In an isotropic sheet the principal directions are held: what they turn with A
+    is left out, so that it is not that of the energy there.
     """
     law = cell.law
     back = wp.transpose(cell.F)

@@ -334,8 +334,10 @@ class GarmentPlan(Plan):
         )
 
     def in_cloth(self, scene: Scene) -> GarmentPlan:
-        """See :meth:`Plan.in_cloth`; a form that is pulled on grows by its cloth, any other stays, with darts for woven cloth, too."""
-        built = None if scene.settings.pulled_on else (self.mannequin, self.form)
+        """See :meth:`Plan.in_cloth`; a form that is pulled on grows by its cloth, any other stays; darts for woven cloth stay, too."""
+        built = self.mannequin, self.form
+        if scene.settings.pulled_on:
+            built = scene_form(self.scene, self.mannequin, strain_limit=scene_fabric(scene).strain_limit)
         return plan_garment(scene, device=self.device, built=built)
 
     @cached_property
