@@ -183,7 +183,8 @@ class FileSurface(Table):
     and borders that meet are seams."""
     prim: str | None = None
     meet_mm: Annotated[float, Field(ge=0, le=10)] | None = None
-    """With component = "all": borders that run along each other within this distance are sewn; 1 if not given, 0 for none but those at one place."""
+    """With component = "all": borders that run along each other within this distance are sewn; 1 if not given, 0 for none but those at
+    one place."""
     pattern: Literal["uv"] | None = None
     """"uv": the islands of the texture are the sewn pattern, in true size; it is taken as it is and compared with what flattening gives."""
 
