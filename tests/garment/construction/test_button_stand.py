@@ -11,6 +11,7 @@ import shapely
 from flat_forms import flat_form, pattern_of, whole_draft
 
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import off_line
 from warpflat.garment.construction.button_stand import button_depths
 from warpflat.garment.construction.details import FinishingTable, OpeningTable
 from warpflat.garment.construction.garment import Garment
@@ -157,3 +158,15 @@ def test_keyhole_is_drawn_on_its_piece_and_on_its_facing(whole: Garment):
     assert larger.contains(around.intersection(shapely.Polygon(plain.piece("back", "").outline).buffer(-1e-4)))
     neck = next(ring for ring in replace(whole, openings=(hole,)).rings if ring.name == "neck")
     assert neck.opened == pytest.approx(0.24)
+
+
+def test_below_a_stand_the_seam_may_bend():
+    """Buttons at the back of trousers end above the crotch; held straight all along, its seam crossed itself."""
+    buttoned = OpeningTable(kind="buttons", seam="crotch back", length_mm=180, facing="separate")
+    pattern = opened(flat_form("trousers", buttoned), buttoned)
+    back = pattern.piece("back_left", "")
+    stand, below = back.edge("crotch back button stand"), back.edge("crotch back")
+    assert stand.length == pytest.approx(0.180, abs=2e-3)
+    assert float(off_line(below.points, below.points[[0, -1]]).max()) > 0.02
+    assert {seam.name for seam in pattern.seams} >= {"crotch back", "crotch front"}
+    whole_draft(pattern)
