@@ -552,6 +552,29 @@ class CutPattern(PanelDistances):
     pieces: dict[str, PanelDistances]
 
 
+class FoundSeam(Entry):
+    """A seam of a whole garment, and its price."""
+
+    name: str
+    length_m: float
+    released_j: float | None
+    """Strain energy that it releases, by trial; none where nothing was tried."""
+    needed: str
+    """Why the cloth cannot lie flat without it; empty where it can."""
+
+
+class FoundGarment(Entry):
+    """What a garment is whose seams were found."""
+
+    what: str
+    outside: float
+    """Share of the cloth beyond its limits."""
+    found_seams: list[FoundSeam]
+    notes: list[str]
+    no_pattern: str | None = None
+    """Why this is no pattern yet."""
+
+
 class Finding(Entry):
     """One thing that the verdict rests on."""
 
@@ -582,6 +605,7 @@ class Metrics(Entry):
     pieces: dict[str, Piece]
     wear: GarmentWear | None = None
     mannequin: Body | None = None
+    garment: FoundGarment | None = None
     seams: list[Seam] | None = None
     pairs: list[list[str]] | None = None
     pattern_of_file: CutPattern | None = None

@@ -189,13 +189,13 @@ def clear_corners(out: CellForces, slot: int, wanted: int, viscous: bool):
 
 
 @wp.func
-def add_forces(out: CellForces, slot: int, at: wp.vec3i, pull: wp.mat22d):
-    """Add a cell's forces, on its corners 1 and 2 as columns, to the corners `at` of its face."""
+def add_forces(out: wp.array(dtype=wp.vec2d), slot: int, at: wp.vec3i, pull: wp.mat22d):
+    """Add a cell's forces, elastic or viscous, on its corners 1 and 2 as columns, to the corners `at` of its face."""
     f1 = wp.vec2d(pull[0, 0], pull[1, 0])
     f2 = wp.vec2d(pull[0, 1], pull[1, 1])
-    out.force[slot + at[0]] -= f1 + f2
-    out.force[slot + at[1]] += f1
-    out.force[slot + at[2]] += f2
+    out[slot + at[0]] -= f1 + f2
+    out[slot + at[1]] += f1
+    out[slot + at[2]] += f2
 
 
 @wp.func
@@ -204,16 +204,6 @@ def add_stiffness(out: CellForces, slot: int, at: wp.vec3i, bounds: wp.vec3d):
     out.stiffness[slot + at[0]] += bounds[0]
     out.stiffness[slot + at[1]] += bounds[1]
     out.stiffness[slot + at[2]] += bounds[2]
-
-
-@wp.func
-def add_drag(out: CellForces, slot: int, at: wp.vec3i, drag: wp.mat22d):
-    """Add a cell's viscosity, on its corners 1 and 2 as columns, to the corners `at` of its face."""
-    d1 = wp.vec2d(drag[0, 0], drag[1, 0])
-    d2 = wp.vec2d(drag[0, 1], drag[1, 1])
-    out.viscosity[slot + at[0]] -= d1 + d2
-    out.viscosity[slot + at[1]] += d1
-    out.viscosity[slot + at[2]] += d2
 
 
 @wp.func

@@ -1,11 +1,8 @@
-"""Quads by rows and columns: numbering of faces, and rows of a grid laid flat."""
+"""Quads by rows and columns."""
 
 import warp as wp
 
-from .indices import natural
-
-# Rounded without fused products, as the same lengths of any other mesh are.
-wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+wp.set_module_options({"enable_backward": False})
 
 
 @wp.kernel
@@ -51,35 +48,3 @@ def number_faces(
                     place[g] = wp.vec3i(row, column, (side + 6 - (other - 4 * g)) % 4)
                     queue[seen] = g
                     seen += 1
-
-
-@wp.kernel
-def lay_profiles(
-    vertices: wp.array(dtype=wp.vec3d),
-    grid: wp.array2d(dtype=wp.int32),
-    column: int,
-    side: wp.float64,
-    station: wp.array(dtype=wp.float64),
-    first: int,
-    # outputs
-    position: wp.array(dtype=wp.vec2d),
-):
-    """Lay each row of a grid along x at its arc lengths on the body from one column; y is its station. All [m].
-
-    vertices: #V. station: #rows. side: 1 for columns to the right, -1 to the left.
-    """
-    i = natural(wp.tid() + first)
-    middle = grid[i, column]
-    position[middle] = wp.vec2d(wp.float64(0.0), station[i])
-    for way in range(2):
-        step = 1 - 2 * way
-        before = vertices[middle]
-        along = side * wp.float64(step)
-        x = wp.float64(0.0)
-        j = column + step
-        while j >= 0 and j < grid.shape[1]:
-            v = natural(grid[i, j])
-            x += along * wp.length(vertices[v] - before)
-            before = vertices[v]
-            position[v] = wp.vec2d(x, station[i])
-            j += step

@@ -379,7 +379,7 @@ def evaluate_face(
                 cell = guarded_cell(D, cell_weight(face), cells.laid[natural(begin + k)], of, guard)
                 energy += cell.energy
                 if wanted != ENERGY:
-                    add_forces(out, slot, at, cell_forces(cell, of, guard))
+                    add_forces(out.force, slot, at, cell_forces(cell, of, guard))
                 if wanted == STEP:
                     bounds = cell_bounds(cell, D, of, guard)
                     add_stiffness(out, slot, at, bounds)

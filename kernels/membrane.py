@@ -26,7 +26,6 @@ from .cells import (
     STEP,
     CellForces,
     Cells,
-    add_drag,
     add_forces,
     add_stiffness,
     cell_corner,
@@ -81,7 +80,7 @@ def evaluate_face(
             area = wp.float64(0.5) * det * cell_weight(face)
             energy += area * cell.law.energy
             if wanted != ENERGY:
-                add_forces(out, slot, at, membrane_forces(cell) * area)
+                add_forces(out.force, slot, at, membrane_forces(cell) * area)
             if wanted == STEP:
                 none = wp.float64(0.0)
                 held = natural(3 * (begin + k))
@@ -93,7 +92,7 @@ def evaluate_face(
                 add_stiffness(out, slot, at, wp.float64(2.0) * beyond)
                 if viscous:
                     V = membrane_viscosity(cell, velocity[corner[0]], velocity[corner[1]], velocity[corner[2]], cloth)
-                    add_drag(out, slot, at, V * (area * time_step))
+                    add_forces(out.viscosity, slot, at, V * (area * time_step))
         else:
             energy = wp.float64(wp.inf)
         k += 1
@@ -196,7 +195,8 @@ def second_derivative(cell: WornCell, cloth: Cloth):
     """Return the second derivative of det(I + A) psi(F (I + A)^-1) by A = du/dx at A = 0, rows and columns A00, A01, A10, A11 [N/m].
 
     With S = F^T P, P = d(psi)/dF, it is, for A along B, that of psi by the worn threads, - tr A (S : B) - tr B (S : A)
-    + tr(S^T (A B + B A)) + psi (tr A tr B - tr(A B)).
+    + tr(S^T (A B + B A)) + psi (tr A tr B - tr(A B)). In an isotropic sheet the principal directions are held: what they turn with A
+    is left out, so that it is not that of the energy there.
     """
     law = cell.law
     back = wp.transpose(cell.F)

@@ -110,6 +110,7 @@ from .toml_file import read_toml as read_toml
 from .usd_layers import check_layers as check_layers
 from .usd_process import UNREADABLE as UNREADABLE
 from .usd_process import read_apart as read_apart
+from .vectors import AXES as AXES
 from .vectors import laid_upon as laid_upon
 from .vectors import reflected as reflected
 from .vectors import turned_left as turned_left

@@ -99,13 +99,13 @@ def aligned(head: Sequence[str], rows: Sequence[Sequence[str]], *, left: Sequenc
     )
 
 
-def energy_words(joules: float, digits: int = 3) -> str:
+def energy_words(joules: float) -> str:
     """Return an energy in J, or in mJ if it is below one; what is below a microjoule is rounding."""
     if abs(joules) < 1e-6:
         return "0 mJ"
     number, unit = (joules, "J") if abs(joules) >= 1.0 else (1e3 * joules, "mJ")
     # Not 1e+02 for 104.
-    return f"{float(f'{number:.{digits}g}'):,.{max(digits, 15)}g} {unit}"
+    return f"{float(f'{number:.3g}'):,.15g} {unit}"
 
 
 def quote_value(value: object) -> str:

@@ -6,10 +6,12 @@ import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["laid_upon", "reflected", "turned_left", "unit"]
+__all__ = ["AXES", "laid_upon", "reflected", "turned_left", "unit"]
 
 # A vector shorter than this has no direction, and stays as short.
 _SHORTEST = 1e-300
+#: Directions by name, as "+x".
+AXES = {sign + letter: (1.0 if sign == "+" else -1.0) * np.eye(3)[k] for k, letter in enumerate("xyz") for sign in "+-"}
 
 
 def unit(vectors: FloatArray) -> FloatArray:

@@ -192,6 +192,7 @@ from .surface.shapes import check_range as check_range
 from .surface.shapes import grid_surface as grid_surface
 from .surface.shapes import make_named as make_named
 from .surface.shapes import make_shape as make_shape
+from .surface.triangles import corner_means as corner_means
 from .surface.triangles import corner_triangles as corner_triangles
 from .surface.triangles import triangulate as triangulate
 from .surface.tubes import inner_borders as inner_borders

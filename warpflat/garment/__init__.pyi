@@ -22,8 +22,7 @@ from .construction.ease import SeamWish as SeamWish
 from .construction.ease import cap_wishes as cap_wishes
 from .construction.ease import seam_ratios as seam_ratios
 from .construction.file_seams import FILE_SEAMS as FILE_SEAMS
-from .construction.file_seams import MOST_ISLANDS as MOST_ISLANDS
-from .construction.file_seams import FileSeams as FileSeams
+from .construction.file_seams import asked_seams as asked_seams
 from .construction.file_seams import file_seams as file_seams
 from .construction.file_seams import like_cut_pieces as like_cut_pieces
 from .construction.finishing import with_plackets as with_plackets
@@ -124,11 +123,9 @@ from .mannequin.pieces import is_part_of as is_part_of
 from .mannequin.scan_measures import ScanMeasure as ScanMeasure
 from .mannequin.scan_pose import ScanOptions as ScanOptions
 from .mannequin.shapes import shaped_form as shaped_form
-from .mannequin.slicer import Slicer as Slicer
 from .mannequin.table import MannequinTable as MannequinTable
 from .mannequin.table import mannequin_from_table as mannequin_from_table
 from .mannequin.usd import write_mannequin_usd as write_mannequin_usd
-from .seams.cloth import Cloth as Cloth
 from .seams.find import GRAIN as GRAIN
 from .seams.find import FoundSeams as FoundSeams
 from .seams.find import find_seams as find_seams
@@ -136,10 +133,8 @@ from .seams.find import seam_words as seam_words
 from .seams.layers import GarmentFile as GarmentFile
 from .seams.layers import read_garment as read_garment
 from .seams.layers import read_layers as read_layers
-from .seams.measure import laid_flat as laid_flat
+from .seams.options import NO_PATTERN as NO_PATTERN
 from .seams.options import Direction as Direction
 from .seams.options import SeamCut as SeamCut
 from .seams.options import SeamOptions as SeamOptions
-from .seams.solid import is_panel as is_panel
-from .seams.solid import parts_within as parts_within
-from .seams.solid import wide_borders as wide_borders
+from .seams.solid import is_whole_garment as is_whole_garment

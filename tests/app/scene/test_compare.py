@@ -179,16 +179,25 @@ def test_all_else_is_what_a_run_makes_in_that_fabric(tmp_path: Path, text: str, 
     assert json.loads(json.dumps(found.as_dict()))["sewing"]["denim"]["seams"]
 
 
-def test_a_dart_that_only_woven_cloth_needs_is_in_each_of_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+@pytest.mark.parametrize("pulled_on", [False, True])
+def test_a_dart_that_only_woven_cloth_needs_is_in_each_of_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pulled_on: bool
+):
     bent = with_bent_elbows(body_of_size(40.0))
     monkeypatch.setattr("warpflat.app.scene.form.scene_mannequin", lambda scene: bent)
     plan = plan_scene(
-        scene_in(tmp_path, 'fabric = "woven"\n' + SKIRT.split("[[seams]]")[0].replace("a_line_skirt", "shirt"))
+        scene_in(
+            tmp_path,
+            f'fabric = "woven"\npulled_on = {str(pulled_on).lower()}\n'
+            + SKIRT.split("[[seams]]")[0].replace("a_line_skirt", "shirt"),
+        )
     )
-    knit = replace(plan.scene, settings=plan.scene.settings.model_copy(update={"fabric": "jersey"}))
-    points = [[len(surface.vertices) for surface in each.surfaces] for each in (plan, plan.in_cloth(knit))]
+    knit = plan.in_cloth(replace(plan.scene, settings=plan.scene.settings.model_copy(update={"fabric": "jersey"})))
+    points = [[len(surface.vertices) for surface in each.surfaces] for each in (plan, knit)]
     assert "elbow dart left" in plan.form.pieces["sleeve_left"].darts
     assert points[0] == points[1]
+    # What is pulled on grows less in a cloth that gives more.
+    assert (knit.form.recipe.neckline != plan.form.recipe.neckline) == pulled_on
 
 
 def test_a_dart_that_a_run_leaves_out_is_not_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]):

@@ -8,6 +8,7 @@ from types import ModuleType
 
 import jsonschema
 import pytest
+import trimesh
 
 import warpflat
 from warpflat.app.scene.schema import SceneTable
@@ -37,6 +38,12 @@ def test_every_table_and_key_is_described_and_every_example_is_valid(reference: 
     for table, model in tables.items():
         notes = reference.key_notes()[table]
         assert set(notes) == {reference.key_of(*each) for each in model.model_fields.items()}, table
+        described = {
+            reference.key_of(name, model.model_fields[name])
+            for name in reference.docstrings_of_keys(model)
+            if name in model.model_fields
+        }
+        assert not described & {key for key, note in notes.items() if "about" in note}, table
         for name, field in model.model_fields.items():
             reference.validate_example(model, name, notes[reference.key_of(name, field)]["example"])
 
@@ -64,6 +71,20 @@ def test_metrics_of_a_run_are_as_published(reference: ModuleType, tmp_path: Path
     metrics["pieces"]["dome"]["flipped_faces"] = "none"
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(metrics, schema)
+
+
+def test_metrics_of_a_garment_whose_seams_were_found_are_as_published(reference: ModuleType, tmp_path: Path) -> None:
+    trimesh.creation.icosphere(1, 0.1).export(tmp_path / "ball.obj")
+    ball = {
+        "surface": {"file": "ball.obj", "units": "m"},
+        "find_seams": {"find": "none"},
+        "seams_cut": [{"plane": {"point": [0.0, 0.0, 0.0], "normal": [1.0, 0.0, 0.0]}}],
+        "output": {"frames": 0, "picture": False},
+        "pattern": {"formats": []},
+    }
+    warpflat.run_scene(warpflat.make_scene(ball, name="ball", folder=tmp_path, where="ball"), tmp_path / "out")
+    assert "garment" in json.loads((tmp_path / "out" / "metrics.json").read_text(encoding="utf-8"))
+    assert reference.check_metrics(tmp_path / "out" / "metrics.json") == []
 
 
 @pytest.mark.parametrize(

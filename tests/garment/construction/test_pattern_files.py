@@ -462,7 +462,7 @@ def test_a_pattern_read_back_makes_the_same_files(
     read = pattern_from_json(json.loads(json.dumps(pattern_json(dress))))
     assert pattern_json(read) == pattern_json(dress)
     for number, pattern in enumerate((dress, read)):
-        write_svg(pattern, tmp_path / f"{number}.svg", nested=True)
+        write_svg(pattern, tmp_path / f"{number}.svg")
         write_dxf(pattern, tmp_path / f"{number}.dxf", dialect="astm")
     assert (tmp_path / "0.svg").read_text() == (tmp_path / "1.svg").read_text()
     assert (tmp_path / "0.dxf").read_text() == (tmp_path / "1.dxf").read_text()

@@ -11,7 +11,7 @@ import trimesh
 from obj_files import write_obj
 
 import warpflat
-from warpflat.app.scene.found_seams import plain_panel, seams_entry
+from warpflat.app.scene.found_seams import plain_panel
 from warpflat.app.scene.load import load_scene
 from warpflat.flat.fabric.library import as_fabric
 from warpflat.flat.surface.connectivity import border_loops, euler_characteristic
@@ -209,10 +209,10 @@ def bone(columns: int) -> Surface:
 def test_a_piece_that_is_narrower_than_its_seams_is_no_pattern_yet() -> None:
     flat = warpflat.flatten(bone(4), fabric="woven")
     found = FoundSeams(pieces=(flat.surface,), seams=(), what="other", up="+y", front="+z")
-    refused = str(seams_entry(found, [flat], 0.02)["no_pattern"])
+    refused = str(found.entry([flat], 0.02)["no_pattern"])
     assert refused.startswith("no pattern yet: bone is somewhere narrower than 10 mm")
     # The strip is 8 mm wide.
-    assert "no_pattern" not in seams_entry(found, [flat], 0.01)
+    assert "no_pattern" not in found.entry([flat], 0.01)
 
 
 @pytest.mark.parametrize("columns", [2, 4])

@@ -255,7 +255,7 @@ def test_a_size_has_its_colour_on_pieces_that_not_all_sizes_have(tmp_path):
     reader = PdfReader(tmp_path / "p.pdf")
     forms = (form.get_object() for page in reader.pages for form in page["/Resources"].get("/XObject", {}).values())
     drawn = next(form for form in forms if b"/size1 BDC" in form.get_data()).get_data().decode("latin-1")
-    write_svg(nest, tmp_path / "p.svg", nested=True)
+    write_svg(nest, tmp_path / "p.svg")
     text = (tmp_path / "p.svg").read_text()
     for k, size in enumerate(sizes[1:], 1):
         shade = [int(SIZE_COLOURS[k][at : at + 2], 16) / 255 for at in (1, 3, 5)]

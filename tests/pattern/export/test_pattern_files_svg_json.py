@@ -71,7 +71,7 @@ def test_every_edge_keeps_its_shape_to_a_hundredth_of_a_millimetre(dress, svg):
 
 
 def test_nested_sizes_lie_upon_each_other(dress, tmp_path):
-    write_svg(dress, tmp_path / "nest.svg", nested=True)
+    write_svg(dress, tmp_path / "nest.svg")
     root = ET.parse(tmp_path / "nest.svg").getroot()
     groups = [g for g in root.findall(f"{SVG}g") if g.get("data-piece") == "skirt front"]
     boxes = [coordinates(g.find(f"{SVG}path[@class='cut']"))[1] for g in groups]

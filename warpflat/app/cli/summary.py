@@ -8,9 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from warpflat.app.cli.tables import cut_words
-from warpflat.app.scene.found_seams import NO_PATTERN
 from warpflat.core import energy_words, format_count
-from warpflat.garment import LACKING
+from warpflat.garment import LACKING, NO_PATTERN
 
 __all__ = ["notes_line", "summary_lines"]
 

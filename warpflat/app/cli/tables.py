@@ -132,7 +132,7 @@ def cut_words(taken: Mapping[str, Any]) -> str:
 
 
 def _price(joules: float | None) -> str:
-    return "" if joules is None else energy_words(joules, 3)
+    return "" if joules is None else energy_words(joules)
 
 
 def drape_lines(metrics: Mapping[str, Any]) -> list[str]:

@@ -36,7 +36,7 @@ def faults_of(metrics: Mapping[str, Any]) -> list[str]:
             work = f"{steps:,} steps" if units <= steps else f"{units:,.0f} work units"
             # Crushed faces make forces infinite; then the strain energy says how far from rest it has ended.
             if last["residual"] is None or not math.isfinite(last["residual"]):
-                remainder = f"strain energy {energy_words(last['strain_energy_j'], 3)}"
+                remainder = f"strain energy {energy_words(last['strain_energy_j'])}"
             else:
                 remainder = f"residual {last['residual']:.1e}"
             lines.append(f"{name} did not converge within {work} ({remainder}); the pattern is not final: {remedy}")

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 
 from warpflat.app.scene.comparison import Comparison, outline
 from warpflat.core import atomic_path
-from warpflat.flat import border_loops
+from warpflat.flat import border_of
 from warpflat.pattern import all_letters, new_figure, write_figure
 
 __all__ = ["write_overlay_picture", "write_overlay_svg"]
@@ -96,8 +96,7 @@ def write_overlay_picture(path: str | os.PathLike[str], comparison: Comparison) 
         first, *others = [comparison.layouts[fabric][piece] for fabric in comparison.fabrics]
         points = comparison.points(piece)
         if not points:
-            faces = comparison.results[comparison.fabrics[0]][piece].faces
-            outline = np.concatenate([np.unique(loop) for loop in border_loops(faces)])
+            outline = border_of(comparison.results[comparison.fabrics[0]][piece].network.surface)
             moved = np.max([np.linalg.norm(other - first, axis=1) for other in others], axis=0)
             points = {"furthest apart": int(outline[np.argmax(moved[outline])])}
         places = []

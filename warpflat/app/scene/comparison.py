@@ -11,7 +11,7 @@ import numpy as np
 
 from warpflat._version import __version__
 from warpflat.core import FloatArray, polyline_length
-from warpflat.flat import Flattening, border_loops
+from warpflat.flat import Flattening, border_loops, border_of
 
 if TYPE_CHECKING:
     from warpflat.garment import Drape
@@ -51,7 +51,7 @@ class Comparison:
     def points(self, piece: str) -> dict[str, int]:
         """Return the named points of a piece, as vertices of its pattern: the ends of its lines on the outline."""
         surface = self.results[self.fabrics[0]][piece].network.surface
-        border = set(np.concatenate(border_loops(surface.faces)).tolist())
+        border = set(border_of(surface).tolist())
         names: dict[int, list[str]] = {}
         for name, line in surface.lines.items():
             if len(line) < 2 or line[0] == line[-1]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from warpflat.app.scene.load import Scene, errors_named, make_scene
 from warpflat.app.scene.schema import CutTable
-from warpflat.core import InputError, IntArray, find_unused_name, quote_value
+from warpflat.core import InputError, IntArray, find_unused_name, quote_value, without_side
 from warpflat.garment import Form, FormDart, Mannequin, part_pieces, taken_over
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def plan_cuts(surface: Surface, tables: Sequence[CutTable]) -> CutSequence:
     from warpflat.flat import (
         CutPlan,
         as_vertex,
-        border_loops,
+        border_of,
         check_tip_back,
         draw_line,
         line_part,
@@ -100,7 +100,7 @@ def plan_cuts(surface: Surface, tables: Sequence[CutTable]) -> CutSequence:
                     path = plane_path(surface, table.plane.point, table.plane.normal, towards=table.plane.towards)
                 surface = draw_line(surface, line, path)
             drawn[number] = line
-    border = {vertex for loop in border_loops(surface.faces) for vertex in loop.tolist()}
+    border = set(border_of(surface).tolist())
     paths: dict[str, list[IntArray]] = {}
     tip_back: dict[str, float] = {}
     for number, (name, table) in enumerate(zip(names, tables, strict=True)):
@@ -250,7 +250,7 @@ def place_of(cut: Mapping[str, Any]) -> tuple[str | None, ...]:
 
 def _dart(table: CutTable) -> FormDart:
     keys: dict[str, Any] = {field.name: getattr(table, field.name) for field in fields(FormDart)}
-    keys["name"] = table.name or f"{table.line}".removesuffix(" left").removesuffix(" right")
+    keys["name"] = table.name or without_side(f"{table.line}")
     return FormDart(**keys | {"part": table.part and (table.part[0], table.part[1])})
 
 

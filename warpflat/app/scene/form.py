@@ -23,7 +23,11 @@ __all__ = ["scene_form", "scene_mannequin", "scene_recipe"]
 
 
 def scene_form(
-    scene: Scene, mannequin: Mannequin | None = None, *, before: FormResult | None = None
+    scene: Scene,
+    mannequin: Mannequin | None = None,
+    *,
+    before: FormResult | None = None,
+    strain_limit: float | None = None,
 ) -> tuple[Mannequin, FormResult]:
     """Build the pieces of the scene's form on its mannequin, or on another one; return both.
 
@@ -31,6 +35,7 @@ def scene_form(
         scene: with a form.
         mannequin: another one than the scene's.
         before: a form on this mannequin that may have much in common, to save time.
+        strain_limit: of another cloth than the scene's, for which a form that is pulled on grows.
 
     Raises:
         InputError: the body, the form or a brick is wrong.
@@ -43,7 +48,7 @@ def scene_form(
             built = wide_enough(
                 mannequin,
                 built,
-                strain_limit=scene_fabric(scene).strain_limit,
+                strain_limit=scene_fabric(scene).strain_limit if strain_limit is None else strain_limit,
                 openings=scene.settings.openings,
                 finishing=scene.settings.finishing,
             )

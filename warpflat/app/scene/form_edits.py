@@ -14,7 +14,7 @@ from warpflat.app.scene.cuts import asked_cuts, cut_of_dart, cuts_beside, omitte
 from warpflat.app.scene.form import scene_form, scene_recipe
 from warpflat.app.scene.form_shaping import settle_shape, sewn_form
 from warpflat.app.scene.load import Scene
-from warpflat.core import InputError, nearest, polyline_length
+from warpflat.core import InputError, nearest, polyline_length, without_side
 from warpflat.garment import FormDart, FormGarment, plan_form
 
 __all__ = ["KINDS", "DartEdit", "edit_dart", "rotate_dart", "split_dart", "turn_dart"]
@@ -101,7 +101,7 @@ def rotate_dart(scene: Scene, dart: str, line: str, *, at: str | None = None) ->
         InputError: there is no such dart.
     """
     old = _find(scene, dart)
-    words = line.removesuffix(" left").removesuffix(" right")
+    words = without_side(line)
     cut = {
         "name": f"{words} dart",
         "piece": old.piece,

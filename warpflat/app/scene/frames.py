@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from warpflat.app.scene.schema import OutputTable
 from warpflat.core import CannotWriteError, FloatArray, IntArray, optional_file, report_activity, system_reason
-from warpflat.flat import Surface, half_edges
-from warpflat.pattern import Polylines, corner_mean
+from warpflat.flat import Surface, corner_means, half_edges
+from warpflat.pattern import Polylines
 
 if TYPE_CHECKING:
     from warpflat.flat import CutPlan, Flattening, Progress
@@ -330,7 +330,7 @@ class Film:
                         continue
                     writer.write_map(name, "pressure", piece.fit.pressure, unit="Pa", state="worn")
                     if self._mannequin is not None:
-                        gaps = corner_mean(body.gaps(piece.surface.vertices), piece.surface.faces)
+                        gaps = corner_means(body.gaps(piece.surface.vertices), piece.surface.faces)
                         writer.write_map(name, "gap", gaps, unit="m", state="designed")
                 pieces = {name: recorder.stages for name, recorder in self.recorders.items()}
                 for number in range(max(len(stages) for stages in pieces.values())):

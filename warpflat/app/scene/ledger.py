@@ -19,7 +19,7 @@ from warpflat.app.scene.cuts import (
 from warpflat.app.scene.form import scene_form, scene_recipe
 from warpflat.app.scene.load import Scene, errors_named, scene_relax_options
 from warpflat.app.scene.plan import GarmentPlan, flatten_surface, plan_garment, scene_cuts
-from warpflat.core import InputError
+from warpflat.core import InputError, without_side
 from warpflat.flat import (
     CutPlan,
     LaidCloth,
@@ -160,7 +160,7 @@ def candidate_cuts(
             if len(candidate.paths) != 1:
                 continue
             row = form.pieces[name].grid_vertices[candidate.paths[0]]
-            words = candidate.name.replace(",", "").replace(" left", "").replace(" right", "")
+            words = without_side(candidate.name.replace(",", ""))
             along = dart_along(layout, form.vertices, bricks[name], row, piece=name, name=words)
             if along is not None and (key := (along.piece, along.line, along.part)) not in found:
                 found.add(key)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from warpflat.app.scene.cuts import CutSequence, cut_of_dart, plan_automatic_cuts, plan_cuts
 from warpflat.app.scene.form import scene_form, scene_mannequin
-from warpflat.app.scene.found_seams import found_seams, plain_panel, seams_entry
+from warpflat.app.scene.found_seams import found_seams, plain_panel
 from warpflat.app.scene.frames import FrameRecorder
 from warpflat.app.scene.load import (
     Scene,
@@ -24,7 +24,7 @@ from warpflat.app.scene.pattern_options import pattern_options
 from warpflat.app.scene.schema import PieceTable
 from warpflat.app.scene.seams import scene_constraints, scene_surface_seams, scene_wishes
 from warpflat.app.scene.surface import scene_pieces, scene_sewn_panels, scene_surface, with_piece_tables
-from warpflat.core import InputError, StepError, optional_step, report_activity
+from warpflat.core import InputError, StepError, optional_step, report_activity, without_side
 from warpflat.flat import (
     Flattening,
     Progress,
@@ -271,7 +271,7 @@ class MeshPlan(Plan):
         """See :meth:`Plan.further_metrics`: the seams that were found."""
         if self.found is None:
             return {}
-        return {"garment": seams_entry(self.found, list(garment.pieces.values()), self.drawing.rules.seam)}
+        return {"garment": self.found.entry(list(garment.pieces.values()), self.drawing.rules.seam)}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -335,8 +335,10 @@ class GarmentPlan(Plan):
         )
 
     def in_cloth(self, scene: Scene) -> GarmentPlan:
-        """See :meth:`Plan.in_cloth`; a form that is pulled on grows by its cloth, any other stays, with darts for woven cloth, too."""
-        built = None if scene.settings.pulled_on else (self.mannequin, self.form)
+        """See :meth:`Plan.in_cloth`; a form that is pulled on grows by its cloth, any other stays; darts for woven cloth stay, too."""
+        built = self.mannequin, self.form
+        if scene.settings.pulled_on:
+            built = scene_form(self.scene, self.mannequin, strain_limit=scene_fabric(scene).strain_limit)
         return plan_garment(scene, device=self.device, built=built)
 
     @cached_property
@@ -352,7 +354,7 @@ class GarmentPlan(Plan):
         on_fold = () if cloth.fold is None else cloth.grid_vertices[cloth.edges[cloth.fold]].tolist()
         for remedy in advised.remedies:
             row = cloth.grid_vertices[remedy.path]
-            title = remedy.words.split(",")[0].removeprefix("a ").removesuffix(" left").removesuffix(" right")
+            title = without_side(remedy.words.split(",")[0].removeprefix("a "))
             dart = dart_along(self.mannequin.layout, self.form.vertices, self.bricks[name], row, piece=name, name=title)
             table = None if dart is None or row[-1] in on_fold else cut_of_dart(dart)
             remedies.append(replace(remedy, table=table))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from warpflat.core import InputError
+from warpflat.core import InputError, without_side
 from warpflat.garment import (
     FinishingTable,
     FormResult,
@@ -63,7 +63,7 @@ def wide_enough(
                 continue
             missing = (1.0 + _MARGIN) * (ring.girth - ring.opened) / (1.0 + strain_limit) - ring.length
             # Both limbs have one ease.
-            line = ring.name.removesuffix(" left").removesuffix(" right")
+            line = without_side(ring.name)
             if missing > 0.0 and (line == "neck" or line in (form.ease if line == ring.name else asked.ease)):
                 short[line] = max(missing, short.get(line, 0.0))
                 passed[line] = ring.over, ring.girth

@@ -179,10 +179,12 @@ class FileSurface(Table):
     file: str = Field(min_length=1)
     units: str | None = None
     component: Component | None = None
-    """Which connected part of the mesh; with "all" every part of every object is a piece, and edges that meet in space are seams."""
+    """Which connected part of the mesh: the largest, or a number from 0, largest first; with "all" every part of every object is a piece,
+    and borders that meet are seams."""
     prim: str | None = None
     meet_mm: Annotated[float, Field(ge=0, le=10)] | None = None
-    """With component = "all": borders that run along each other within this distance are sewn; 1 if not given."""
+    """With component = "all": borders that run along each other within this distance are sewn; 1 if not given, 0 for none but those at
+    one place."""
     pattern: Literal["uv"] | None = None
     """"uv": the islands of the texture are the sewn pattern, in true size; it is taken as it is and compared with what flattening gives."""
 
@@ -195,7 +197,7 @@ class FileSurface(Table):
 
 
 class ShapeSurface(Table):
-    """A surface by formula; its other keys are the parameters of that function of `warpflat.flat.surface.shapes`."""
+    """A surface by formula; its other keys are the parameters of that shape, see Shapes below."""
 
     model_config = ConfigDict(extra="allow")
     shape: str

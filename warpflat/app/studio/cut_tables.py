@@ -13,8 +13,8 @@ from warpflat.app.scene.form import scene_recipe
 from warpflat.app.scene.load import Scene
 from warpflat.app.studio.pick import Hit
 from warpflat.app.studio.solve import Solution
-from warpflat.core import FloatArray, InputError, IntArray, arc_lengths
-from warpflat.flat import Flattening, border_loops
+from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, without_side
+from warpflat.flat import Flattening, border_of
 from warpflat.garment import FormDart, dart_along, is_part_of, select_bricks, usual_darts
 
 __all__ = ["cut_along", "cut_between", "cuttable_lines", "rounded"]
@@ -132,7 +132,7 @@ def _dart_table(solution: Solution, piece: str, line: str, row: IntArray) -> dic
     ends = row if int(row[0]) in _border(solution.pieces[piece]) else row[::-1]
     recipe = scene_recipe(plan.scene, plan.mannequin)[1].pieces[piece]
     layout = plan.mannequin.layout
-    base = line.removesuffix(" left").removesuffix(" right")
+    base = without_side(line)
     dart = dart_along(
         layout, plan.form.vertices, select_bricks(layout, recipe.bricks), plan.form.pieces[piece].grid_vertices[ends],
         piece=piece, name=base,
@@ -148,7 +148,7 @@ def _dart_table(solution: Solution, piece: str, line: str, row: IntArray) -> dic
 
 
 def _border(piece: Flattening) -> set[int]:
-    return {vertex for loop in border_loops(piece.surface.faces) for vertex in loop.tolist()}
+    return set(border_of(piece.surface).tolist())
 
 
 def rounded(point: FloatArray) -> list[float]:

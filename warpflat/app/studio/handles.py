@@ -14,7 +14,7 @@ from warpflat.app.scene.plan import GarmentPlan
 from warpflat.app.studio.cut_tables import rounded
 from warpflat.app.studio.solve import Solution
 from warpflat.core import FloatArray, IntArray, arc_lengths, unit
-from warpflat.flat import Crack, border_loops, seam_kind, triangulate
+from warpflat.flat import Crack, border_of, seam_kind, triangulate
 from warpflat.garment import FormDart, Mesh, Neckline, PlacedDart, dart_part, select_bricks
 
 __all__ = ["Handle", "pattern_handles"]
@@ -252,7 +252,7 @@ def _move_end(
         return {"cuts": cuts}
     point = _on_surface(piece.network.surface.vertices, piece.network.surface.faces, flat, to)
     if not is_tip:
-        border = surface.vertices[np.concatenate(border_loops(surface.faces))]
+        border = surface.vertices[border_of(surface)]
         point = border[np.linalg.norm(border - point, axis=1).argmin()]
     rest = surface.vertices[seam.path[-1 - end]]
     ends = {end: point, -1 - end: rest}

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.launch import launch_each
 from warpflat.core.polyline import arc_lengths
 from warpflat.flat.flattening.harmonic_layout import harmonic_layout, refuse_tubes
 from warpflat.flat.solver.collapse import Coarsening, iterate_coarsenings
@@ -25,7 +24,6 @@ from warpflat.flat.surface.connectivity import (
     euler_characteristic,
     non_manifold_vertices,
 )
-from warpflat.flat.surface.grid import rows_and_columns
 from warpflat.flat.surface.half_edges import half_edges, half_edges_of, opposite_half_edges
 from warpflat.flat.surface.injective import winds_twice
 from warpflat.flat.surface.mesh import Surface
@@ -34,7 +32,6 @@ from warpflat.flat.surface.paths.geodesic import signed_distance_and_station
 from warpflat.flat.surface.triangles import corner_triangles, triangulate
 from warpflat.flat.surface.untangle import signed_cell_areas, untangle
 from warpflat.flat.surface.vectors import norm, points_at
-from warpflat.kernels.grid_lists import lay_profiles
 
 __all__ = [
     "Development",
@@ -50,8 +47,6 @@ __all__ = [
 # A piece is flat if it leaves its plane by no more than this share of its size, the rounding of single precision.
 _FLAT = 1e-5
 _FEW_VERTICES = 100
-# A thread takes at least this many rows of a grid.
-_FEW_ROWS = 64
 _GOLDEN = 0.6180339887498949
 # A development is repaired rather than given up if at most this share of its faces is mirrored.
 _FEW = 0.1
@@ -251,26 +246,6 @@ def profile_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
     """
     if not surface.is_quad.all() or datum[0] == datum[-1]:
         return None
-    grid = rows_and_columns(surface)
-    if grid is not None:
-        # Of a rectangular grid, where the datum is one of its columns or rows.
-        for lines, mirrored in ((grid, False), (grid.T, True)):
-            column = np.flatnonzero(lines[0] == datum[0])
-            upwards = len(column) == 1
-            if not upwards:
-                column = np.flatnonzero(lines[-1] == datum[0])
-            ordered = lines if upwards else lines[::-1]
-            if len(column) == 0 or not np.array_equal(ordered[:, column[0]], datum):
-                continue
-            at = int(column[0])
-            # Whether the faces go round anticlockwise where columns lie to the right of one another and rows above one another.
-            y, x = np.unravel_index([int(np.argmax(grid == vertex)) for vertex in surface.faces[0]], grid.shape)
-            turns = np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) > 0
-            side = 1.0 if (turns == upwards) != mirrored else -1.0
-            positions = np.empty((len(surface.vertices), 2))
-            given = [surface.vertices, ordered, at, side, arc_lengths(surface.vertices[datum])]
-            launch_each(lay_profiles, len(ordered), given, [positions], least=_FEW_ROWS)
-            return positions
     station = arc_lengths(surface.vertices[datum])
     positions = np.full((len(surface.vertices), 2), np.nan)
     positions[datum] = np.column_stack([np.zeros(len(datum)), station])

@@ -22,11 +22,12 @@ from warpflat.flat.fabric.fabric import Fabric
 from warpflat.flat.fabric.limits import Amount, Demand
 from warpflat.flat.model.network import SpringNetwork
 from warpflat.flat.model.strain import shear_angles, worn_cell_strain
-from warpflat.flat.model.wear import SKIN_LENGTH, smooth_face_values, thread_curvatures
+from warpflat.flat.model.wear import smooth_face_values, thread_curvatures
 from warpflat.flat.surface.connectivity import border_of, components
 from warpflat.flat.surface.curvature import curvature_tensors
 from warpflat.flat.surface.energy_map import place_in_words, smooth_to_vertices
 from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.triangles import corner_means
 
 __all__ = ["MAPS", "TOUCHING", "Misfit", "WornFit", "assess_fit", "assess_pattern"]
 
@@ -90,8 +91,7 @@ class Misfit:
         points = self.surface.vertices
         tensors = curvature_tensors(self.surface)
         gaussian = 0.5 * np.abs(np.trace(tensors, axis1=1, axis2=2) ** 2 - (tensors**2).sum(axis=(1, 2)))
-        used = self.surface.faces >= 0
-        of_faces = np.where(used, gaussian[self.surface.faces], 0.0).sum(axis=1) / used.sum(axis=1)
+        of_faces = corner_means(gaussian, self.surface.faces)
         curved = smooth_to_vertices(self.surface, of_faces, smoothing_length=_CURVED_OVER)
         curved[np.linalg.norm(points - points[self.vertex], axis=1) > 2.0 * np.sqrt(self.area)] = 0.0
         curved[border_of(self.surface)] = 0.0
@@ -241,7 +241,7 @@ def assess_fit(network: SpringNetwork, positions: FloatArray) -> WornFit:
     tension_warp, tension_weft, loaded = mean(pull[:, 0]), mean(pull[:, 1]), mean(load)
     # A million faces of them take a tenth of a gigabyte each, and the smoothing more.
     del strain, stress, lengths, spread, pull, load, along_warp, along_weft, crossed
-    pressure = smooth_face_values(surface, loaded, SKIN_LENGTH)
+    pressure = smooth_face_values(surface, loaded)
     # A stretch that is asked for beyond the limit is meant: the cloth is judged from there.
     asked = np.zeros((faces, 2)) if network.stretch is None else network.stretch - 1.0
     meant = np.where(asked > fabric.strain_limit, asked, 0.0)

@@ -18,6 +18,7 @@ from warpflat.flat.model.network import SpringNetwork
 from warpflat.flat.surface.curvature import curvature_tensors
 from warpflat.flat.surface.energy_map import smooth_to_vertices
 from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.triangles import corner_means
 from warpflat.kernels.curvature import bend_threads
 
 __all__ = ["SKIN_LENGTH", "Wear", "intended_stretch", "unused_stretch"]
@@ -82,12 +83,9 @@ def thread_curvatures(network: SpringNetwork, positions: FloatArray) -> tuple[Fl
     return along[:, 0], along[:, 1], along[:, 2]
 
 
-def smooth_face_values(surface: Surface, values: FloatArray, length: float) -> FloatArray:
-    """Return face values (#F) smoothed over a length on the surface [m], #F."""
-    at_vertices = smooth_to_vertices(surface, values, smoothing_length=length)
-    used = surface.faces >= 0
-    corners = np.where(used, at_vertices[np.maximum(surface.faces, 0)], 0.0)
-    return np.asarray(corners.sum(axis=1) / used.sum(axis=1))
+def smooth_face_values(surface: Surface, values: FloatArray) -> FloatArray:
+    """Return face values (#F) smoothed as skin is, #F."""
+    return corner_means(smooth_to_vertices(surface, values, smoothing_length=SKIN_LENGTH), surface.faces)
 
 
 def intended_stretch(
@@ -124,9 +122,7 @@ def intended_stretch(
     face_area = np.maximum(np.bincount(network.cell_arrays.face, area, minlength=len(surface.faces)), 1e-300)
     curved = [
         smooth_face_values(
-            surface,
-            np.bincount(network.cell_arrays.face, area * k, minlength=len(surface.faces)) / face_area,
-            SKIN_LENGTH,
+            surface, np.bincount(network.cell_arrays.face, area * k, minlength=len(surface.faces)) / face_area
         )
         for k in thread_curvatures(network, positions)[:2]
     ]

@@ -27,6 +27,7 @@ from warpflat.flat.solver.stop import Outcome, Remainder, RemainderEstimate
 from warpflat.flat.surface.connectivity import border_of
 from warpflat.flat.surface.injective import border_edges_of, crack_edges_of, crossings, is_injective, near_edges
 from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.triangles import corner_means
 
 __all__ = ["Barrier", "open_cracks", "relax_with_contact", "swirl"]
 
@@ -52,8 +53,7 @@ def open_cracks(surface: Surface, positions: FloatArray) -> FloatArray:
     edges, crack = border_edges_of(surface), crack_edges_of(surface)
     sides = np.union1d(edges.tail[crack], edges.head[crack])
     faces, used = surface.faces, surface.faces >= 0
-    corners = np.where(used[:, :, None], positions[faces], 0.0)
-    middle = corners.sum(axis=1) / used.sum(axis=1)[:, None]
+    middle = corner_means(positions, faces)
     face, vertex = np.nonzero(used)[0], faces[used]
     count = np.bincount(vertex, minlength=len(positions))[sides]
     mean = np.stack(

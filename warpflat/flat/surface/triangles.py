@@ -14,12 +14,18 @@ from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.flat.surface.connectivity import join_labels
 from warpflat.flat.surface.half_edges import four_columns
 
-__all__ = ["corner_triangles", "selected_rows", "triangulate", "unfold_quad_diagonals"]
+__all__ = ["corner_means", "corner_triangles", "selected_rows", "triangulate", "unfold_quad_diagonals"]
 
 Number = TypeVar("Number", bound=np.generic)
 
 # Corners of a quad's four corner triangles: before, corner, after.
 _CORNER_TRIANGLES = np.array([[3, 0, 1], [0, 1, 2], [1, 2, 3], [2, 3, 0]])
+
+
+def corner_means(values: FloatArray, faces: NDArray[np.integer]) -> FloatArray:
+    """Return the mean of the values (#V or #V by #D) at the corners of each face (#F by 4, -1 as the fourth of a triangle)."""
+    used = (faces >= 0).reshape(*faces.shape, *(1 for _ in values.shape[1:]))
+    return np.asarray(np.where(used, values[faces], 0.0).sum(axis=1) / used.sum(axis=1))
 
 
 def triangulate(

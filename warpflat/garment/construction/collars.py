@@ -90,7 +90,7 @@ def with_collar(
         )
     if collar.style in ("flat", "convertible"):
         # It ends at the centre front: a button stand lies beyond it.
-        pattern, parted, places = _parted_at(pattern, places, "centre front")
+        pattern, parted, places = _parted_at_front(pattern, places)
         breaks = [*breaks, *parted]
     chains = _long_chains(pattern, places, gaps, breaks)
     # Two halves of a flat one meet in front and leave the back open.
@@ -216,7 +216,7 @@ def with_hood(
     Raises:
         InputError: the neckline opens behind, or is too narrow for the hood.
     """
-    pattern, breaks, places = _parted_at(pattern, places, "centre front")
+    pattern, breaks, places = _parted_at_front(pattern, places)
     chains = _long_chains(pattern, places, gaps, breaks)
     if len(chains) != 1 or chains[0].closed or not _ends_in_front(pattern, chains[0]):
         raise InputError("a hood begins and ends at the centre front, and this neckline does not")
@@ -275,12 +275,12 @@ def _long_chains(
     return [chain for chain, length in zip(chains, lengths, strict=True) if length > 0.5 * max(lengths)]
 
 
-def _parted_at(pattern: Pattern, places: Sequence[Place], line: str) -> tuple[Pattern, list[Break], list[Place]]:
-    """Return a pattern whose edges are parted where a line meets them, the ends of chains there, and the edges that there are now."""
+def _parted_at_front(pattern: Pattern, places: Sequence[Place]) -> tuple[Pattern, list[Break], list[Place]]:
+    """Return a pattern whose edges are parted at the centre front, the ends of chains there, and the edges that there are now."""
     breaks, now = list[Break](), list(places)
     for name, edge in places:
         side = FreeChain(sides=(SeamSide(piece=name, edge=edge),), closed=False)
-        at = {size: marks_of(pattern, side, size, line) for size in pattern.pieces}
+        at = {size: marks_of(pattern, side, size, "centre front") for size in pattern.pieces}
         lengths = {size: edge_at(pattern, (name, edge), size).length for size in pattern.pieces}
         if any(len(row) != 1 or not OFF_END < row[0] < lengths[size] - OFF_END for size, row in at.items()):
             continue

@@ -124,12 +124,7 @@ def plan_curves(
     """
     ruled = {(each.piece, each.line) for each in constraints if isinstance(each, Straight | FixedLength)}
     girths = [each for each in constraints if isinstance(each, KeptGirth)]
-    sewn = {
-        (name, edge)
-        for seam in form.seams
-        for run in seam.runs
-        for name, edge in zip(seam.pieces, run.edges, strict=True)
-    }
+    sewn = _seam_of_edge(form)
     plans = []
     for name, piece in form.pieces.items():
         bound = bounds[name]
@@ -189,12 +184,7 @@ def measure_curves(
     """
     import shapely
 
-    of_edge = {
-        (name, edge): seam.name
-        for seam in form.seams
-        for run in seam.runs
-        for name, edge in zip(seam.pieces, run.edges, strict=True)
-    }
+    seam_of_edge = _seam_of_edge(form)
     measured = []
     for plan, result in zip(plans, results, strict=True):
         place, after = (plan.line.piece, plan.line.line), positions[plan.line.piece][plan.line.vertices]
@@ -204,7 +194,7 @@ def measure_curves(
         measured.append(
             DrawnCurve(
                 place=".".join(place),
-                seam=of_edge.get(place, ""),
+                seam=seam_of_edge.get(place, ""),
                 book=plan.book,
                 straight=plan.straight,
                 away_mm=1e3 * plan.away,
@@ -215,6 +205,12 @@ def measure_curves(
             )
         )
     return tuple(measured)
+
+
+def _seam_of_edge(form: FormResult) -> dict[tuple[str, str], str]:
+    """Return the seams of edges that are sewn, by piece and edge."""
+    sides = ((seam, run.edges) for seam in form.seams for run in seam.runs)
+    return {(name, edge): seam.name for seam, edges in sides for name, edge in zip(seam.pieces, edges, strict=True)}
 
 
 def _open_edges(form: FormResult, name: str, flat: FloatArray) -> Iterator[tuple[str, IntArray]]:

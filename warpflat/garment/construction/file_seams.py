@@ -7,16 +7,18 @@ are one, so that formats that split them (GLB) and those that do not (OBJ, USD) 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations, pairwise
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, FloatArray, format_count
+from warpflat.core import BoolArray, FloatArray, InputError, format_count
 from warpflat.flat import RawMesh, following_corners, join_labels, weld_map
 
-__all__ = ["COUNTED", "FILE_SEAMS", "MOST_ISLANDS", "FileSeams", "file_seams", "like_cut_pieces"]
+__all__ = ["COUNTED", "FILE_SEAMS", "MOST_ISLANDS", "FileSeams", "asked_seams", "file_seams", "like_cut_pieces"]
 
 Ids = NDArray[np.int64]
 
@@ -115,6 +117,29 @@ def file_seams(raw: RawMesh) -> dict[str, FileSeams]:
             joined=joined,
         )
     return found
+
+
+def asked_seams(path: Path, find: str, seams: Mapping[str, FileSeams]) -> FileSeams:
+    """Return those of a file's seams that are asked for.
+
+    Raises:
+        InputError: the file has none of them, or too many for a pattern.
+    """
+    wanted = FILE_SEAMS if find == "file" else (find,)
+    taken = next((seams[way] for way in wanted if way in seams), None)
+    if taken is None:
+        lacks = {"uv": "texture coordinates", "materials": "more than one material", "groups": "more than one group"}
+        other = f"seams by {' and '.join(seams)}" if seams else "no other seams either"
+        raise InputError(
+            f"{path}: find = {find!r}: the file does not have {' or '.join(lacks[way] for way in wanted)}; it has {other}: "
+            'give find = "auto" (--seams auto) to look for seams'
+        )
+    if len(taken.names) > MOST_ISLANDS:
+        raise InputError(
+            f"{path}: find = {find!r}: {taken.describe()} are too many for a pattern, which has at most {MOST_ISLANDS} pieces; "
+            'find = "auto" (--seams auto) looks for seams'
+        )
+    return taken
 
 
 def like_cut_pieces(raw: RawMesh, seams: FileSeams) -> str:

@@ -113,7 +113,7 @@ def finish_edges(
                 pattern = with_shaped_waistband(pattern, places, wish.width, gaps=gaps)
             else:
                 if wish.placket:
-                    pattern, breaks = with_slits(pattern, places, wish.placket, "sleeve")
+                    pattern, breaks = with_slits(pattern, places, wish.placket)
                     pattern, places = _opened_up(pattern, wish.edge)
                 for chain, count in free_chains(pattern, places, gaps, breaks):
                     if wish.kind == "flounce":

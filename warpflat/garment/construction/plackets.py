@@ -40,7 +40,7 @@ _TURNED_IN = 0.006
 _BEHIND = 0.5
 
 
-def with_slits(pattern: Pattern, places: Sequence[Place], length: float, called: str) -> tuple[Pattern, list[Break]]:
+def with_slits(pattern: Pattern, places: Sequence[Place], length: float) -> tuple[Pattern, list[Break]]:
     """Return a pattern with a slit up from each of some edges, where a chain of free edges is broken, and its binding.
 
     The slit lies towards the back: on the side of the piece that is sewn to a back, half-way from the middle of the edge to its end.
@@ -49,7 +49,6 @@ def with_slits(pattern: Pattern, places: Sequence[Place], length: float, called:
         pattern: with all its openings.
         places: pieces and edges.
         length: of the slit [m].
-        called: what the bindings are named after.
 
     Raises:
         InputError: the slit does not lie within its piece.
@@ -74,7 +73,7 @@ def with_slits(pattern: Pattern, places: Sequence[Place], length: float, called:
         pattern, broken = split_edge(redrawn(pattern, place[0], slit), place, at)
         breaks.append(broken)
     count = sum(pattern.piece(name, pattern.sample).quantity for name, _ in places)
-    title = free_piece_name(pattern, f"{called}_placket")
+    title = free_piece_name(pattern, "sleeve_placket")
     turned_in = {"lower": _TURNED_IN, "upper": _TURNED_IN}
 
     def binding(like: Piece) -> Piece:

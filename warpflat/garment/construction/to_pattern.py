@@ -494,7 +494,6 @@ def pattern_of_surface(
     *,
     name: str,
     rules: EdgeRules | None = None,
-    size: str = "",
     seams: Sequence[SeamTable] = (),
     ends: Mapping[str, Collection[int]] | None = None,
     worn: Collection[str] = (),
@@ -509,7 +508,6 @@ def pattern_of_surface(
         name: of the pattern.
         rules: kinds and allowances of edges and holes; an edge along a feature line has the line's name, others are
             called "edge_1" and so on, counter-clockwise.
-        size: for the label.
         seams: of the border, by the lines that are sewn to each other.
         ends: by piece the vertices at which its border is parted into edges, beside its corners and the ends of lines.
         worn: pieces that are sewn to others in space, where a crack that gapes is a vent and no dart.
@@ -528,7 +526,7 @@ def pattern_of_surface(
     for result in results:
         with optional_step(f"{result.surface.name} was left out of the pattern") if len(results) > 1 else nullcontext():
             own = result.surface.name
-            drawn[own] = _mesh_piece(result, size, ends.get(own, ()), is_worn=own in worn)
+            drawn[own] = _mesh_piece(result, ends.get(own, ()), is_worn=own in worn)
     if not drawn:
         raise InputError("none of the pieces can be drawn")
     results, pieces = [result for result in results if result.surface.name in drawn], list(drawn.values())
@@ -565,10 +563,10 @@ def pattern_of_surface(
                 hole = replace(hole, allowance=DEFAULT_ALLOWANCE[kind] if width is None else width)
             holes.append(hole)
         ruled.append(replace(piece, edges=edges, holes=holes))
-    return Pattern(name=name, pieces={size: ruled}, seams=_mesh_seams(results, ruled, rules, named)), notes
+    return Pattern(name=name, pieces={"": ruled}, seams=_mesh_seams(results, ruled, rules, named)), notes
 
 
-def _mesh_piece(result: Flattening, size: str, ends: Collection[int] = (), *, is_worn: bool = False) -> Piece:
+def _mesh_piece(result: Flattening, ends: Collection[int] = (), *, is_worn: bool = False) -> Piece:
     """Return one piece with its cuts as darts, and its grain."""
     darts: dict[str, tuple[int, int, int]] = {}
     fisheyes: dict[str, Crack] = {}
@@ -597,7 +595,6 @@ def _mesh_piece(result: Flattening, size: str, ends: Collection[int] = (), *, is
             ends=ends,
             worn=result.surface.vertices[result.vertex_origin] if is_worn else None,
         ),
-        size=size,
         fabric=result.fabric.name,
     )
     # The tip of a dart lies short of the end of its cut, both tips of a fish-eye dart short of both ends.

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 import warp as wp
 
-from warpflat.core import FloatArray, InputError, nearest, polyline_length, reflected, short_repr, start_warp
+from warpflat.core import AXES, FloatArray, InputError, nearest, polyline_length, reflected, short_repr, start_warp
 from warpflat.flat import Fabric, Surface, triangulate, vertex_normals
 from warpflat.garment.construction.mirror import mirror_plane
 from warpflat.garment.draping.body import Body
@@ -47,10 +47,7 @@ _TOP, _OFF, _ALIKE = 0.9, 0.05, 0.75
 # Pieces are sewn on a mesh of this spacing at least [m]. Cloth around less than this share of the body's waist is no garment for it.
 _COARSE, _LEAST_GIRTH = 0.02, 0.5
 # Where a piece lies that is said, or named, to be there.
-_LOOKS = {
-    "front": np.array([0.0, 0.0, 1.0]), "back": np.array([0.0, 0.0, -1.0]),
-    "left arm": np.array([1.0, 0.0, 0.0]), "right arm": np.array([-1.0, 0.0, 0.0]),
-}  # fmt: skip
+_LOOKS = {"front": AXES["+z"], "back": AXES["-z"], "left arm": AXES["+x"], "right arm": AXES["-x"]}
 # What is sewn to less than this share of its length is gathered or pleated. A patch lies this far over its piece [m].
 _FULL, _ON_TOP = 0.85, 0.0015
 # A flounce stands out by this share of its length, and what is gathered or pleated by this one.

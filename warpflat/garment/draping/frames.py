@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core import latest_file
+from warpflat.flat import corner_means
 from warpflat.garment.draping.result import Drape
 from warpflat.pattern import (
     ENERGY,
@@ -17,7 +18,6 @@ from warpflat.pattern import (
     SKIN,
     Scale,
     begin_stage,
-    corner_mean,
     define_group,
     define_mesh,
     export_stage,
@@ -38,7 +38,7 @@ _BESIDE = 0.3
 _SEEN = 1e-4
 
 
-def choose_frames(frames: Sequence[NDArray[np.float32]], count: int = _COUNT) -> list[int]:
+def choose_frames(frames: Sequence[NDArray[np.float32]]) -> list[int]:
     """Return the numbers of frames between which the cloth moves about equally far, without those in which it does not move.
 
     The first and the last are among them.
@@ -48,12 +48,12 @@ def choose_frames(frames: Sequence[NDArray[np.float32]], count: int = _COUNT) ->
         if np.abs(frame - frames[moving[-1]]).max() > _SEEN:
             moving.append(number)
     moving = sorted({*moving[: max(len(moving) - 1, 1)], len(frames) - 1})
-    if len(moving) <= count:
+    if len(moving) <= _COUNT:
         return moving
     moves = [0.0, *(float(np.linalg.norm(frames[b] - frames[a], axis=1).mean()) for a, b in pairwise(moving))]
     # Half by displacement and half by time, for what creeps is worth a look too.
     progress = np.cumsum(moves) / max(sum(moves), 1e-12) + np.linspace(0.0, 1.0, len(moving))
-    return sorted({moving[int(np.abs(progress - share).argmin())] for share in np.linspace(0.0, 2.0, count)})
+    return sorted({moving[int(np.abs(progress - share).argmin())] for share in np.linspace(0.0, 2.0, _COUNT)})
 
 
 def gap_scale(drape: Drape) -> Scale:
@@ -113,6 +113,6 @@ def write_drape_frames(path: Path, drape: Drape) -> None:
         for name in drape.cloth.piece_vertices:
             faces = drape.cloth.flat_faces[drape.cloth.piece_faces[name]]
             if name in shown and layer.GetPrimAtPath(shown[name]):
-                gaps = corner_mean(drape.gap[drape.cloth.welded], faces)
+                gaps = corner_means(drape.gap[drape.cloth.welded], faces)
                 set_face_map(layer, shown[name], "gap", gaps, unit="m", state="draped")
     export_stage(stage, path)

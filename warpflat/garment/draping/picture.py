@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core import FloatArray
+from warpflat.flat import corner_means
 from warpflat.garment.draping.frames import choose_frames, gap_scale
 from warpflat.garment.draping.result import Drape
 from warpflat.pattern import (
@@ -24,7 +25,6 @@ from warpflat.pattern import (
     Facets,
     Scale,
     Shot,
-    corner_mean,
     drawn_page,
     dress,
     outline_edges,
@@ -87,7 +87,7 @@ def write_drape_film(path: str | os.PathLike[str], drape: Drape) -> None:
     pictures = []
     for number in choose_frames(drape.frames):
         points = drape.frames[number].astype(np.float64)
-        colours = np.concatenate([scale.rgb(corner_mean(drape.body.gaps(points), drape.cloth.faces)), skin])
+        colours = np.concatenate([scale.rgb(corner_means(drape.body.gaps(points), drape.cloth.faces)), skin])
         views = views_around(np.concatenate([points, dressed[count:]]), facets).values()
         shots = [
             Shot(view, per_metre, low=room.min(axis=0), size=np.ptp(room, axis=0))
@@ -113,8 +113,8 @@ def _maps(drapes: list[Drape], skins: list[FloatArray]) -> dict[str, tuple[Scale
         scale = ends(np.concatenate(values), areas, *bounds)
         return scale, [np.concatenate([scale.rgb(each), skin]) for each, skin in zip(values, skins, strict=True)]
 
-    gaps = [1e3 * corner_mean(drape.gap, drape.cloth.faces) for drape in drapes]
-    pressures = [1e-3 * corner_mean(drape.pressure, drape.cloth.faces) for drape in drapes]
+    gaps = [1e3 * corner_means(drape.gap, drape.cloth.faces) for drape in drapes]
+    pressures = [1e-3 * corner_means(drape.pressure, drape.cloth.faces) for drape in drapes]
     strain, shear = 100.0 * max(f.strain_limit for f in limits), max(f.shear_limit for f in limits)
     return {
         "gap to the body [mm]": coloured(gaps, Scale.from_zero, LEAST_GAP),

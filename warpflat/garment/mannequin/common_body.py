@@ -21,6 +21,7 @@ from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.read_body import read_body
 from warpflat.garment.mannequin.scan_levels import TRUNK
 from warpflat.garment.mannequin.scan_pose import ScanOptions
+from warpflat.garment.mannequin.slicer import UP, Slicer
 from warpflat.garment.mannequin.stand_body import lay_on_scan
 
 __all__ = ["CommonBody", "common_body_inside", "common_body_of_mannequin", "common_body_of_scan", "skin_triangles"]
@@ -57,6 +58,12 @@ class CommonBody:
     def level(self, name: str) -> float:
         """Return the height [m] of a level of the trunk: bust, underbust, waist or hip, where its mannequin has it."""
         return _landmark(name, self.vertices) + self.above.get(name, 0.0)
+
+    def middle_in_file(self, name: str) -> FloatArray:
+        """Return the middle of a level of the trunk, in the body's file [its unit]."""
+        cut = Slicer(self.vertices, finer_body()[1]).cut(UP, self.level(name))
+        trunk = max((part.points for part in cut), key=lambda points: float(np.ptp(points[:, 0])))
+        return np.asarray((trunk.mean(axis=0) - self.shift) @ np.linalg.inv(self.turn))
 
     def in_pose_of(self, other: CommonBody) -> CommonBody:
         """Return this body as it stands where another one does, and with its joints bent as the other's."""

@@ -184,7 +184,7 @@ def standard_darts(layout: Layout, bricks: Mapping[str, Sequence[str]]) -> tuple
     found: list[FormDart] = []
     for piece, chosen in bricks.items():
         cloth = _cloth(layout, chosen)
-        if _bust_mouth(layout, cloth, "bust") is not None:
+        if _bust_mouth(layout, cloth) is not None:
             found.append(FormDart(name="bust dart", piece=piece, line="bust"))
         for face in ("front", "back"):
             dart = FormDart(name="waist dart", piece=piece, line=f"princess {face} left")
@@ -384,9 +384,9 @@ def usual_darts(layout: Layout, vertices: FloatArray, bricks: Mapping[str, Seque
     return tuple(found)
 
 
-def _bust_mouth(layout: Layout, cloth: _Cloth, line: str) -> list[int] | None:
+def _bust_mouth(layout: Layout, cloth: _Cloth) -> list[int] | None:
     """Return the run of the bust line from the left side of a front piece; None if it does not run from there to a bust point."""
-    run = _longest_run(layout.lines[line].tolist(), cloth)
+    run = _longest_run(layout.lines["bust"].tolist(), cloth)
     side = int(layout.rings[layout.level_row["bust"], layout.quarter])
     if side not in (run[0], run[-1]) if run else True:
         return None
@@ -413,7 +413,7 @@ def _default_run(
             )
         run = run if run[0] in there else run[::-1]
     elif dart.line == "bust":
-        run = _bust_mouth(layout, cloth, "bust") or run
+        run = _bust_mouth(layout, cloth) or run
     elif run[-1] in waist and run[0] not in waist:
         run = run[::-1]
     face = "front" if "front" in dart.line else "back"

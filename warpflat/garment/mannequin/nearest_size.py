@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from warpflat.core import without_side
 from warpflat.garment.mannequin.layout import LEG_LINES, RING_LEVELS
 from warpflat.garment.mannequin.measurements import Measurements, measurements_from_size, size_tables
 
@@ -75,10 +76,7 @@ def difference_to_size(name: str, heights: Mapping[str, float], girths: Mapping[
         girths: the same [m].
     """
     size = measurements_from_size(name)
-    measured = {
-        line: _OF_ONE_LEG.get(line, _MEASUREMENT.get(line.removesuffix(" left").removesuffix(" right")))
-        for line in girths
-    }
+    measured = {line: _OF_ONE_LEG.get(line, _MEASUREMENT.get(without_side(line))) for line in girths}
     return SizeDifference(
         size=name,
         heights={k: heights[k] - size.heights[_HEIGHT[k]] for k in girths if k in _HEIGHT},

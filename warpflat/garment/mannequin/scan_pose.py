@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import FloatArray, InputError, nearest, unit
+from warpflat.core import AXES, FloatArray, InputError, nearest, unit
 from warpflat.flat import METRES_PER_UNIT, join_labels, stray_vertex, stray_words
 from warpflat.garment.mannequin.scan_repair import find_holes, smooth_noise, turned_outward
 from warpflat.garment.mannequin.slicer import UP, Slicer, plane_axes
@@ -18,7 +18,6 @@ from warpflat.garment.mannequin.summit import summit
 __all__ = ["LANDMARKS", "LEVELS_UP", "ScanOptions", "across_trunk", "find_facing", "find_legs", "turn_scan_upright"]
 
 _UNITS = {name: METRES_PER_UNIT[name] for name in ("m", "dm", "cm", "mm", "in")}
-_AXES = {s + a: sign * np.eye(3)["xyz".index(a)] for s, sign in (("+", 1.0), ("-", -1.0)) for a in "xyz"}
 _STATURE = (0.9, 2.3)
 #: Levels of trunk and legs, from the floor up.
 LEVELS_UP = (
@@ -76,8 +75,8 @@ class ScanOptions:
             raise InputError(f"scan unit {self.unit!r} is unknown: {nearest(self.unit, _UNITS)}")
         for name in ("up", "facing"):
             axis = getattr(self, name)
-            if axis is not None and axis not in _AXES:
-                raise InputError(f"scan {name} {axis!r} is no axis: {nearest(axis, _AXES)}")
+            if axis is not None and axis not in AXES:
+                raise InputError(f"scan {name} {axis!r} is no axis: {nearest(axis, AXES)}")
         if self.up and self.facing and self.up[1] == self.facing[1]:
             raise InputError(f"scan: up {self.up} and facing {self.facing} lie on one axis; give two different ones")
         for name, height in self.landmarks.items():
@@ -114,20 +113,20 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
     notes = [f"loose pieces of less than 1 % of the scan's faces were left out: {loose}"] if loose else []
     if turned:
         notes.append(f"faces of the scan that were wound inward were turned: {turned} of {len(scanned)}")
-    candidates = [options.up] if options.up else list(_AXES)
+    candidates = [options.up] if options.up else list(AXES)
     slicer = Slicer(points, triangles)
-    rated = [(find_legs(slicer, _AXES[a]), a) for a in candidates]
+    rated = [(find_legs(slicer, AXES[a]), a) for a in candidates]
     (score, sideways), up_name = max(rated, key=lambda r: r[0][0])
     sits = options.keep_pose and score < 0.6
     if sits:
-        rated = [(find_legs(slicer, _AXES[a], sits=True), a) for a in candidates]
+        rated = [(find_legs(slicer, AXES[a], sits=True), a) for a in candidates]
         (score, sideways), up_name = max(rated, key=lambda r: r[0][0])
     if score < 0.6 or sideways is None:
         seen = "with the given up axis " if options.up else "in any direction "
         raise InputError(
             f"scan: {seen}no two separate legs under one trunk and head; a standing body with feet apart is needed"
         )
-    up = _AXES[up_name]
+    up = AXES[up_name]
     height = float(np.ptp(points @ up))
     could_be = (name for name, factor in _UNITS.items() if _STATURE[0] <= height * factor <= _STATURE[1])
     unit_name = options.unit or next(could_be, None)
@@ -147,7 +146,7 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
     left = unit(sideways) if sits else across_trunk(slicer, up, sideways)
     ahead = np.cross(left, up)
     if options.facing:
-        wished = _AXES[options.facing] - up * (_AXES[options.facing] @ up)
+        wished = AXES[options.facing] - up * (AXES[options.facing] @ up)
         if abs(ahead @ wished) < 0.7:
             raise InputError(f"scan: it does not face {options.facing}: its legs stand side by side along that axis")
         turn = float(np.sign(ahead @ wished))

@@ -15,13 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import dijkstra
 
-from warpflat.core import FloatArray, points_at_lengths, polyline_length, reflected, unit
+from warpflat.core import AXES, FloatArray, points_at_lengths, polyline_length, reflected, unit
 from warpflat.flat import components
 from warpflat.garment.seams.cloth import BESIDE_LINE, FACES, SAME_WAY, Cloth, section
 from warpflat.garment.seams.fields import MirrorMap, mirror_map
 
 __all__ = [
-    "AXES",
     "END",
     "FROM_SHOULDERS",
     "HOLE",
@@ -46,8 +45,6 @@ Kind = Literal[
 #: Kinds of garments that a tailor knows how to cut, and those of them that hang from the shoulders.
 TAILORED = ("top", "dress", "skirt", "trousers", "jumpsuit")
 FROM_SHOULDERS = ("top", "dress", "jumpsuit")
-#: Directions by name.
-AXES = {sign + letter: (1.0 if sign == "+" else -1.0) * np.eye(3)[k] for k, letter in enumerate("xyz") for sign in "+-"}
 
 #: What borders are.
 ROLES = ("neck", "waist", "hem", "sleeve", "leg", "opening", "armhole", "hole", "border", "middle", "limb")

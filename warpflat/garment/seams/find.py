@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +22,14 @@ from warpflat.core import (
 )
 from warpflat.flat import (
     Fabric,
+    Flattening,
     Surface,
     area_vectors,
     as_fabric,
     border_loops,
     line_from_curve,
     line_on_plane,
+    load_library,
     plane_sections,
     triangulate,
 )
@@ -46,8 +49,8 @@ from warpflat.garment.seams.cloth import ALIKE, Cloth, PieceMesh, are_among
 from warpflat.garment.seams.energy import Trial, cut_by_energy
 from warpflat.garment.seams.measure import laid_flat
 from warpflat.garment.seams.openings import open_tubes
-from warpflat.garment.seams.options import SeamOptions
-from warpflat.garment.seams.solid import LaidFlat, is_panel, part_solids
+from warpflat.garment.seams.options import NO_PATTERN, SeamOptions
+from warpflat.garment.seams.solid import LaidFlat, is_panel, part_solids, parts_within
 from warpflat.garment.seams.symmetric import averaged, mirrored
 from warpflat.garment.seams.tailor import FACING, cut_as_a_tailor, draw_fields, side_word, with_drawn_sleeves
 from warpflat.garment.seams.thickness import without_thickness
@@ -69,6 +72,9 @@ _AROUND = 0.35
 
 # A piece is longer than wide from this ratio of the second moments of its length and width on.
 _LONG = 2.0
+
+# A pattern is nowhere narrower than this share of its seams' allowance.
+_WIDTH = 0.5
 
 #: The line of a piece along which its grain runs.
 GRAIN = "grain"
@@ -97,6 +103,52 @@ class FoundSeams:
     front: str
     notes: tuple[str, ...] = ()
     along: str = ""
+
+    def beyond_limit(self, fabric: Fabric) -> float:
+        """Return the share of the cloth that is beyond its limit where the pieces are laid flat, about."""
+        vectors = [area_vectors(piece.vertices, triangulate(piece.faces)[0]) for piece in self.pieces]
+        area = [float(np.linalg.norm(each, axis=1).sum()) for each in vectors]
+        return float(np.average([laid_flat(piece, fabric, 0.0).outside for piece in self.pieces], weights=area))
+
+    def knit_for(self, fabric: Fabric) -> str:
+        """Return the name of the knit that gives the least of those in which the pieces are a pattern; "" if there is none."""
+        knits = [knit for knit in load_library().values() if knit.is_knit and knit.strain_limit > fabric.strain_limit]
+        for knit in sorted(knits, key=lambda one: one.strain_limit):
+            if self.beyond_limit(knit) <= NO_PATTERN:
+                return knit.name
+        return ""
+
+    def entry(self, pieces: Sequence[Flattening], allowance: float) -> dict[str, Any]:
+        """Return the entry `garment` of `metrics.json`: what it is, its seams, and whether this is a pattern yet.
+
+        Args:
+            pieces: flat.
+            allowance: of seams [m].
+        """
+        area = np.array([float(piece.fit.area.sum()) for piece in pieces])
+        outside = np.array([piece.fit.outside for piece in pieces])
+        share = float((outside * area).sum() / area.sum())
+        entry: dict[str, Any] = {
+            "what": self.what,
+            "outside": share,
+            "found_seams": [seam.as_dict() for seam in self.seams],
+            "notes": list(self.notes),
+        }
+        if share > NO_PATTERN:
+            worst = pieces[int((outside * area).argmax())].surface.name
+            entry["no_pattern"] = (
+                f"no pattern yet: {100 * share:.0f} % of the cloth is beyond its limit, most of it in {worst}; take a fabric that gives "
+                "more, smooth wrinkles (--smooth 5), or cut the mesh further"
+            )
+        elif narrow := [
+            one.surface.name for one in pieces if parts_within(one.faces, one.positions, _WIDTH * allowance) != 1
+        ]:
+            entry["no_pattern"] = (
+                f"no pattern yet: {', '.join(narrow)} {'is' if len(narrow) == 1 else 'are'} somewhere narrower than "
+                f"{1e3 * _WIDTH * allowance:g} mm, so that nothing is left within the seams; leave seams out (--no), or draw "
+                "others (--cut-seam)"
+            )
+        return entry
 
 
 def find_seams(

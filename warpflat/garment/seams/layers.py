@@ -1,15 +1,27 @@
-"""The layers of a garment that was made as a whole: its connected parts, without buttons and crumbs; and the lines drawn on it."""
+"""The layers of a garment that was made as a whole: connected parts, without buttons and crumbs; the lines and seams that its file has."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
-from warpflat.core import InputError, area_words, format_count, make_file_name, plain_label, quote_value
+from warpflat.core import (
+    InputError,
+    area_words,
+    find_unused_name,
+    format_count,
+    make_file_name,
+    make_piece_name,
+    plain_label,
+    quote_value,
+)
 from warpflat.flat import (
     ALL_PRIMS,
     POSSIBLE,
@@ -17,15 +29,24 @@ from warpflat.flat import (
     RawMesh,
     Surface,
     check_size,
+    corner_means,
     euler_characteristic,
+    flat_areas,
+    half_edges_of,
     make_surface,
     parts_of_faces,
     read_mesh_file,
     surplus_faces,
     surplus_layers,
+    weld_map,
     wrong_size,
 )
+from warpflat.garment.construction.file_seams import FileSeams
 from warpflat.garment.seams.options import SeamCut
+
+if TYPE_CHECKING:
+    from warpflat.garment.seams.find import FoundSeams
+    from warpflat.pattern import FoundSeam
 
 __all__ = ["GarmentFile", "read_garment", "read_layers"]
 
@@ -44,6 +65,87 @@ class GarmentFile(NamedTuple):
     marks: tuple[SeamCut, ...]
     raw: RawMesh
     scale: float
+
+    def cuts_along(self, seams: FileSeams, layers: Sequence[Surface], file: str) -> list[SeamCut]:
+        """Return a cut for each two islands that meet, along the edges that the layers still have within them after their repair.
+
+        What ran along an inner shell, or to it across a thickness, is gone with that, or lies on the border.
+        """
+        place = weld_map(self.raw.vertices).astype(np.int64)
+
+        def keys(edges: NDArray[np.int64]) -> NDArray[np.int64]:
+            ends = np.sort(place[edges], axis=1)
+            return ends[:, 0] * len(place) + ends[:, 1]
+
+        sides = [(layer.input_index, half_edges_of(layer)) for layer in layers]
+        there = [keys(index[each.edges[each.count > 1]].astype(np.int64)) for index, each in sides]
+        is_left = np.isin(keys(seams.edges), np.concatenate(there))
+        edges, beside = seams.edges[is_left], np.sort(seams.beside[is_left], axis=1)
+        return [
+            SeamCut(
+                name=f"seam {a} {b}",
+                edges=tuple(map(tuple, edges[(beside == (a, b)).all(axis=1)].tolist())),
+                where=file,
+            )
+            for a, b in np.unique(beside, axis=0).tolist()
+        ]
+
+    def named(self, found: FoundSeams, seams: FileSeams) -> FoundSeams:
+        """Return the pieces with the names that the file has for them, seams and edges named by the pieces that meet there.
+
+        A piece is of the island of most of its cloth, and has its name. Groups and materials name pieces of a texture only where each has
+        its own.
+        """
+        raw = self.raw
+        tree = cKDTree(corner_means(raw.vertices, raw.polygons) * self.scale)
+        islands, titles = list[int](), dict[str, list[str]](groups=[], materials=[])
+        for piece in found.pieces:
+            triangles = piece.faces[:, :3]
+            area = flat_areas(piece.vertices, triangles)
+            face = tree.query(piece.vertices[triangles].mean(axis=1))[1]
+            islands.append(int(np.bincount(seams.island[face], area).argmax()))
+            for way, of in (("groups", raw.face_group), ("materials", raw.face_material)):
+                titles[way].append("" if of is None else of[1][int(np.bincount(of[0][face], area).argmax())])
+        names = [piece.name for piece in found.pieces]
+        for way in [seams.way] if seams.way in titles else titles:
+            own = [make_piece_name(title) for title in titles[way]]
+            if all(titles[way]) and (way == seams.way or len(set(own)) == len(own)):
+                taken: set[str] = set()
+                names = []
+                for name in own:
+                    number = [f"{name}_{k + 1}" for k in range(len(own))] if own.count(name) > 1 else [name]
+                    names.append(next(one for one in number if one not in taken))
+                    taken.add(names[-1])
+                break
+        known = dict(zip(islands[::-1], names[::-1], strict=True))
+        edge = re.compile(r"seam (\d+) (\d+)")
+
+        def renamed(title: str, own: str | None = None) -> str:
+            match = edge.match(title)
+            if match is None:
+                return title
+            pair = [known.get(int(match[k]), "piece") for k in (1, 2)]
+            if own is None:
+                words = f"{pair[0]} to {pair[1]}" if pair[0] != pair[1] else f"seam of {pair[0]}"
+                return words.replace("_", " ")
+            return f"to {pair[1] if pair[0] == own else pair[0]}" if pair[0] != pair[1] else "seam"
+
+        pieces: list[Surface] = []
+        made: list[FoundSeam] = []
+        titled = set[str]()
+        for piece, name, island in zip(found.pieces, names, islands, strict=True):
+            lines: dict[str, Any] = {}
+            for title, line in piece.lines.items():
+                lines[find_unused_name(renamed(title, known[island]), lines)] = line
+            pieces.append(replace(piece, name=name, lines=lines))
+        for seam in found.seams:
+            title = find_unused_name(renamed(seam.name), titled)
+            titled.add(title)
+            made.append(replace(seam, name=title))
+        # A seam that ends inside the cloth is told by its name.
+        notes = [edge.sub(lambda match: renamed(match[0]), note) for note in found.notes]
+        along = seams.describe(len(set(islands)))
+        return replace(found, pieces=tuple(pieces), seams=tuple(made), notes=tuple(notes), along=along)
 
 
 def read_layers(

@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, is_number, nearest, quote_value
+from warpflat.core import AXES, FloatArray, InputError, is_number, nearest, quote_value
 
-__all__ = ["DIRECTIONS", "FAMILIES", "Direction", "SeamCut", "SeamOptions", "in_family"]
+__all__ = ["FAMILIES", "NO_PATTERN", "Direction", "SeamCut", "SeamOptions", "in_family"]
 
 Direction = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
-DIRECTIONS = get_args(Direction)
+#: More than this share of the cloth beyond its limit is no pattern yet.
+NO_PATTERN = 0.1
 #: Names of seams that are found, without their side.
 FAMILIES = (
     "armhole",
@@ -171,8 +172,8 @@ class SeamOptions:
                 if key == "keep" and self.forbids(name):
                     raise InputError(f"{quote_value(name)} is both in keep and in no; leave it out of one")
         for key, value in (("up", self.up), ("front", self.front)):
-            if value is not None and value not in DIRECTIONS:
-                raise InputError(f"{key} = {value!r} is no direction; {nearest(str(value), DIRECTIONS)}")
+            if value is not None and str(value) not in AXES:
+                raise InputError(f"{key} = {value!r} is no direction; {nearest(str(value), AXES)}")
         if self.waist is not None and not (len(self.waist) == 3 and all(map(_is_coordinate, self.waist))):
             raise InputError(f"waist = {self.waist!r} is no place; give three numbers [m], of which its height counts")
         if not 0.0 <= self.smooth <= 0.1:

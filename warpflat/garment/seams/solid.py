@@ -26,7 +26,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 
 from warpflat.core import FloatArray, IntArray, polyline_length, unit
-from warpflat.flat import border_loops, inner_borders
+from warpflat.flat import Surface, border_loops, euler_characteristic, inner_borders, triangulate
 from warpflat.garment.seams.anatomy import HOLE, Anatomy
 from warpflat.garment.seams.cloth import ALIKE, SAME_WAY, Cloth, PieceMesh, section
 from warpflat.garment.seams.fields import TriangleMesh
@@ -41,9 +41,9 @@ __all__ = [
     "LayFlat",
     "is_open",
     "is_panel",
+    "is_whole_garment",
     "part_solids",
     "parts_within",
-    "wide_borders",
 ]
 
 Ids = NDArray[np.int64]
@@ -63,6 +63,10 @@ _ENOUGH = 0.03
 NARROW, _THIN = 0.05, 0.05
 #: Nobody sews a neck of cloth narrower than this, half a usual allowance [m].
 SEWABLE = 5e-3
+# A ring that lacks more than this share of a full turn does not lie flat: its cloth would be stretched by as much.
+_CONE = 0.05
+# A mesh of fewer faces is too coarse for a garment.
+_FEWEST = 60
 # Normals, and rings around the ends of limbs, are smoothed over this share of the size: wrinkles and facets are no shape.
 _SMOOTH = 0.04
 # A cut pays for itself: a seam as long as the part is wide counts as this strain. So does a cut of a round part that leaves parts which
@@ -128,7 +132,7 @@ def _is_sewn_inside(cloth: Cloth, mesh: PieceMesh) -> bool:
     return any(turn <= -np.pi and np.isin(mesh.vertex_of[loop], seams).all() for loop, turn in borders)
 
 
-def wide_borders(cloth: Cloth) -> list[float]:
+def _wide_borders(cloth: Cloth) -> list[float]:
     """Return the lengths of the borders of a cloth that are no holes [m]."""
     lengths = [polyline_length(cloth.vertices[loop], closed=True) for loop in cloth.loops]
     return [one for one in lengths if one > HOLE * cloth.size]
@@ -136,8 +140,22 @@ def wide_borders(cloth: Cloth) -> list[float]:
 
 def is_panel(cloth: Cloth) -> bool:
     """Return whether a cloth is one panel: with one border that is about as long as that of a flat disk of its area, or longer."""
-    wide = wide_borders(cloth)
+    wide = _wide_borders(cloth)
     return len(wide) == 1 and wide[0] ** 2 >= _PANEL * 4.0 * np.pi * cloth.size**2
+
+
+def is_whole_garment(surface: Surface) -> bool:
+    """Return whether a surface cannot lie flat in one piece: closed, with handles, forked, a cap, or a cone with its tip cut off."""
+    if len(surface.faces) < _FEWEST:
+        return False
+    cloth = Cloth(vertices=surface.vertices, faces=triangulate(surface.faces)[0].astype(np.int64))
+    wide = _wide_borders(cloth)
+    handles = (2 - len(border_loops(surface.faces, surface.vertices)) - euler_characteristic(surface.faces)) // 2
+    if len(wide) == 2:
+        # Between a flat ring and a tube, which is cut open, lies what neither is nor becomes flat, such as a poncho.
+        lack = 1.0 + inner_borders(surface)[0][1] / (2.0 * np.pi)
+        return handles > 0 or _CONE < lack < 0.5
+    return len(wide) != 1 or handles > 0 or not is_panel(cloth)
 
 
 def part_solids(

@@ -393,8 +393,7 @@ def _keep_near(
     """Bring the curves of clean edges within the tolerance of their points, where their seams allow it."""
     within = TOLERANCE if tolerance is None else tolerance
     keys = [(piece.name, edge.name) for piece in pieces for edge in piece.edges if edge.kind != "fold"]
-    clean = [key for key in keys if fitted[key][1] <= within]
-    far = [key for key in clean if fitted[key][1] != within or farthest(fitted[key][0].sample(), lines[key]) > within]
+    far = [key for key in keys if fitted[key][1] <= within and farthest(fitted[key][0].sample(), lines[key]) > within]
     tried = fitted | {key: (fit_curve(lines[key], within, near=True), within) for key in far}
     unchecked = list(seams)
     # The edges of a mirror pair are sewn at two seams: a curve that one of them rejects changes the other.

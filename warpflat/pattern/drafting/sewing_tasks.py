@@ -257,8 +257,8 @@ class SewingTasks:
     def _with_role(self, *roles: str) -> list[str]:
         return [name for name, piece in self.pieces.items() if piece.role in roles]
 
-    def _has_kind(self, name: str, kind: str) -> bool:
-        return any(edge.kind == kind for edge in self.pieces[name].edges)
+    def _has_hem(self, name: str) -> bool:
+        return any(edge.kind == "hem" for edge in self.pieces[name].edges)
 
     def _finish(self, elastics: Sequence[Elastic]) -> None:
         """Add the tasks that finish edges and pieces, until every free edge is used up by one of them."""
@@ -303,7 +303,7 @@ class SewingTasks:
         # A pocket of a first project is a panel like others, but nothing is sewn to its edges.
         loose = [name for name in self.pieces if name not in joined]
         pockets = [name for name in loose if self.pieces[name].role == "pocket" or name.endswith("pocket")]
-        patches = [name for name in pockets if self._has_kind(name, "hem")]
+        patches = [name for name in pockets if self._has_hem(name)]
         self._add("patch_pocket", patches, self._take_of(patches))
         welts = [name for name in pockets if name not in patches]
         self._add("welt_pocket", welts, self._take_of(welts))
@@ -364,7 +364,7 @@ class SewingTasks:
 
     def _finish_strips(self) -> None:
         """Add ruffles and hems of hoods; what their own seam to the garment leaves of strips, collars and facings goes with that."""
-        ruffles = [name for name in self._with_role("strip") if self._has_kind(name, "hem")]
+        ruffles = [name for name in self._with_role("strip") if self._has_hem(name)]
         self._add("ruffle_hem", ruffles, self._take_of(ruffles, ("hem",)))
         pleated = [name for name in ruffles if any("pleat fold" in line for line in self.pieces[name].internal_lines)]
         self._add("ruffle_pleats", pleated)

@@ -12,7 +12,6 @@ from warpflat.flat import flat_areas, half_edges, triangulate
 
 __all__ = [
     "Polylines",
-    "corner_mean",
     "face_areas",
     "outline_edges",
     "polylines_of",
@@ -36,12 +35,6 @@ def face_areas(positions: FloatArray, faces: IntArray) -> FloatArray:
     triangles, face = triangulate(faces)
     areas = flat_areas(positions, triangles)
     return np.bincount(face, weights=areas, minlength=len(faces)).astype(np.float64)
-
-
-def corner_mean(values: FloatArray, faces: IntArray) -> FloatArray:
-    """Return the mean of the values (#V) at the corners of each face (#F by 4, -1 as the fourth of a triangle), #F."""
-    used = faces >= 0
-    return np.asarray(np.where(used, values[faces], 0.0).sum(axis=1) / used.sum(axis=1))
 
 
 def outline_edges(faces: IntArray) -> IntArray:

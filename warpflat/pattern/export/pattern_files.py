@@ -406,7 +406,7 @@ def _write(
         lengths = "english" if english else "metric"
         write_dxf(drafted, file, dialect=dialect, units=lengths, sizes=sizes, rul=file_in(folder, name, ".rul"))
     elif kind == "svg":
-        write_svg(drafted, file, sizes=sizes, nested=True)
+        write_svg(drafted, file, sizes=sizes)
     elif kind == "pdf":
         write_pdf(drafted, file, paper=paper, sizes=sizes)
     elif kind == "plt":

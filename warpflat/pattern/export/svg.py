@@ -46,14 +46,8 @@ OF_SIZE = ("cut", "dart", "notch")
 _SEWN = ("sew", "hem", "dart")
 
 
-def write_svg(
-    garment: DraftedGarment,
-    path: str | os.PathLike[str],
-    *,
-    sizes: Sequence[str] | None = None,
-    nested: bool = False,
-) -> None:
-    """Write the pieces side by side, in true size.
+def write_svg(garment: DraftedGarment, path: str | os.PathLike[str], *, sizes: Sequence[str] | None = None) -> None:
+    """Write the pieces side by side, in true size; all sizes of one lie upon each other, as a grading nest, without their sewing lines.
 
     Groups are called "PIECE-SIZE"; in them the cut line is "PIECE-SIZE.cut" and every edge "PIECE-SIZE.EDGE" (what
     an id may not hold becomes "_"; the plain names stand in `data-piece`, `data-size` and `data-edge`). What is sewn to an edge stands
@@ -63,13 +57,8 @@ def write_svg(
         garment: drafted.
         path: of the file.
         sizes: those to draw; None draws all.
-        nested: lay all sizes of a piece upon each other, as a grading nest; of several sizes the sewing lines are not
-            displayed.
     """
-    groups = nests(garment, sizes)
-    if not nested:
-        groups = [(piece,) for size in garment.pieces for nest in groups for piece in nest if piece.size == size]
-    sheet = lay_out(groups)
+    sheet = lay_out(nests(garment, sizes))
     page = SvgPage(float(sheet.size[0]), float(sheet.size[1]), garment.name)
     seams = seam_words(garment.garment.seams)
     drawn = [size for size in garment.pieces if sizes is None or size in sizes]

@@ -12,6 +12,7 @@ from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.flat.surface.connectivity import components, fan_labels, join_labels, part_fans
 from warpflat.flat.surface.half_edges import HalfEdges, border_edges, paired_half_edges
 from warpflat.flat.surface.normals import area_vectors
+from warpflat.flat.surface.triangles import corner_means
 
 __all__ = ["THICKEST", "OuterSheet", "inner_sheets", "outer_sheet", "part_sheets"]
 
@@ -48,7 +49,7 @@ def part_sheets(vertices: FloatArray, he: HalfEdges) -> tuple[IntArray, IntArray
     # Into each face, at right angles to the edge.
     along = vertices[he.edges[he.edge[at], 1]] - vertices[he.edges[he.edge[at], 0]]
     length = np.linalg.norm(along, axis=1)
-    into = _middles(vertices, he.faces[he.face[at]]) - vertices[he.tail[at]]
+    into = corner_means(vertices, he.faces[he.face[at]]) - vertices[he.tail[at]]
     into -= along * ((into * along).sum(axis=1) / np.maximum(length**2, np.finfo(float).tiny))[:, None]
     into /= np.maximum(np.linalg.norm(into, axis=1, keepdims=True), np.finfo(float).tiny)
     starts = np.flatnonzero(np.append(True, np.diff(he.edge[at]) != 0))
@@ -75,12 +76,6 @@ def part_sheets(vertices: FloatArray, he: HalfEdges) -> tuple[IntArray, IntArray
     torn = np.zeros(len(vertices), dtype=bool)
     torn[he.edges[crowded]] = True
     return part_fans(he, fan_labels(he, a, b), torn)
-
-
-def _middles(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return #F by 3, the mean of the corners of each face (#F by 4)."""
-    real = faces >= 0
-    return np.asarray((vertices[np.maximum(faces, 0)] * real[..., None]).sum(axis=1) / real.sum(axis=1)[:, None])
 
 
 def _facing(middle: FloatArray, vector: FloatArray, reach: FloatArray) -> tuple[IntArray, BoolArray, float] | None:
@@ -160,7 +155,7 @@ def outer_sheet(vertices: FloatArray, he: HalfEdges) -> OuterSheet | None:
     faces = he.faces
     vector = area_vectors(vertices, faces)
     area = np.linalg.norm(vector, axis=1)
-    middle = _middles(vertices, faces)
+    middle = corner_means(vertices, faces)
     if float((vector * (middle - middle.mean(axis=0))).sum()) < 0.0:
         vector = -vector
     normal = vector / np.maximum(area, np.finfo(float).tiny)[:, None]
@@ -225,7 +220,7 @@ def inner_sheets(layers: Sequence[tuple[FloatArray, IntArray]]) -> dict[int, tup
 
     low, high = (np.array([bound(points, axis=0) for points, _ in layers]) for bound in (np.min, np.max))
     vectors = [area_vectors(points, faces) for points, faces in layers]
-    middles = [_middles(points, faces) for points, faces in layers]
+    middles = [corner_means(points, faces) for points, faces in layers]
     areas = np.array([np.linalg.norm(vector, axis=1).sum() for vector in vectors])
     if not areas.sum() > 0.0:
         return {}
