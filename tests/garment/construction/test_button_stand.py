@@ -19,6 +19,7 @@ from warpflat.garment.construction.linings import add_interfacing
 from warpflat.garment.construction.openings import OpeningPart, place_opening
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.pieces import Pattern
+from warpflat.pattern.drafting.sewing_order import sewing_steps
 
 BUTTONED = OpeningTable(kind="buttons", seam="centre front", width_mm=20)
 FACING = FinishingTable(kind="facing", edge="neck", width_mm=55)
@@ -170,3 +171,11 @@ def test_below_a_stand_the_seam_may_bend():
     assert float(off_line(below.points, below.points[[0, -1]]).max()) > 0.02
     assert {seam.name for seam in pattern.seams} >= {"crotch back", "crotch front"}
     whole_draft(pattern)
+
+
+def test_a_facing_is_folded_in_before_a_waistband_is_sewn_over_its_end():
+    garment = flat_form("trousers", OpeningTable(kind="buttons", seam="crotch back", length_mm=180, facing="separate"))
+    grown_on = OpeningTable(kind="buttons", seam="crotch back", length_mm=180)
+    band = FinishingTable(kind="waistband", edge="waist", width_mm=35, overlap_mm=30)
+    steps = [step.technique for step in sewing_steps(draft_garment(opened(garment, grown_on, finishing=(band,))), "")]
+    assert steps.index("grown_facing") < steps.index("waistband_ends")
