@@ -290,7 +290,7 @@ def straight_hems(form: FormResult, asked: Sequence[Constraint]) -> list[Straigh
     ]
 
 
-def straight_stands(form: FormResult, openings: Sequence[OpeningTable]) -> list[Constraint]:
+def straight_stands(form: FormResult, openings: Sequence[OpeningTable]) -> list[Straight]:
     """Return the constraints that lay the edges of button stands and wraps straight along the grain; a fold is so anyway.
 
     Below a stand that ends within its seam, that may bend, as between the legs of trousers.

@@ -114,7 +114,7 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
     longest = max(pieces, key=lambda piece: sum(edge.length for edge in piece.fold_edges))
     edge, joints = _widest_edge(pieces), shapely.MultiLineString([] if paper is None else list(paper.joints))
     sizes = ", ".join(piece.size for piece in pieces)
-    drawings = []
+    drawings = list[Drawing]()
     for index, piece in enumerate(pieces):
         # Dashes of several sizes upon each other would be a full line.
         strokes = [
@@ -174,7 +174,7 @@ def _size_tags(piece: DraftedPiece, name: str, share: float, avoided: Geometry, 
     ring, tags = shapely.LinearRing(piece.cut_line), list[Words]()
     line = piece.edge(name).line
     for start, along in ((0.08, 0.3), (0.62, 0.3)) if polyline_length(line) > SHORT_EDGE else ((0.05, 0.9),):
-        tried = []
+        tried = list[tuple[bool, bool, int, Words]]()
         # A little to either side, more and more.
         for away in (0.0, *(sign * step * 0.02 for step in range(1, 16) for sign in (1, -1))):
             middle = min(max(start + along * share + away, 0.0), 1.0)
@@ -183,7 +183,7 @@ def _size_tags(piece: DraftedPiece, name: str, share: float, avoided: Geometry, 
             on_cut = np.asarray(ring.interpolate(ring.project(shapely.Point(at))).coords[0])
             words = Words(text=piece.size, at=on_cut, height=0.004, angle=float(np.arctan2(y, x)), bold=True, tag=True)
             box = shapely.Polygon(words.box())
-            tried.append((box.intersects(joints), box.intersects(avoided), len(tried), words))
+            tried.append((bool(box.intersects(joints)), bool(box.intersects(avoided)), len(tried), words))
         tags.append(min(tried, key=lambda each: each[:3])[3])
     return tags
 
