@@ -217,6 +217,10 @@ def test_the_verdict_says_whether_it_fits_what_it_needs_and_no_knit_is_an_error(
     assert "10&nbsp;cm at the neck" in words
     words = words.replace("&nbsp;", " ")
     assert "Fits by its strain" in words
+    assert "At rest" in words
+    missing = told({"pieces": {"front": piece}, "left_out": ["it was not sewn"]})
+    assert "Not done: it was not sewn." in missing
+    assert "At rest" not in missing
     assert "needs an opening of 10 cm at the neck to be put on: 37.0 cm around, and 56.9 cm must pass (head)" in words
     assert "It can be put on" not in words
     # Where it was draped, the drape alone says whether it fits.

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.app.review.faults import is_done
 from warpflat.app.scene.load import make_scene, scene_fabric
 from warpflat.app.scene.options import COMMAND_LINE, errors_of_options
 from warpflat.core import (
@@ -466,12 +467,11 @@ def fit_to(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fitted:
-    """What has come of a garment on one body: how it was carried, the folder and the metrics of its run, and whether that is fine."""
+    """What has come of a garment on one body: how it was carried, and the folder and the metrics of its run."""
 
     carried: Carried
     folder: Path
     metrics: Mapping[str, Any]
-    converged: bool
 
     @property
     def fits(self) -> bool | None:
@@ -495,7 +495,7 @@ class Fitted:
             "pieces": len(pieces),
             "area_m2": area,
             "fits": self.fits,
-            "done": self.converged,
+            "done": is_done(self.metrics),
         }
 
 
@@ -509,7 +509,7 @@ def write_study(folder: Path, fitted: Sequence[Fitted]) -> list[str]:
     from warpflat.core import output_folder, write_report
 
     entries = [
-        {**each.carried.as_dict(), "folder": str(each.folder), "fits": each.fits, "done": each.converged}
+        {**each.carried.as_dict(), "folder": str(each.folder), "fits": each.fits, "done": is_done(each.metrics)}
         for each in fitted
     ]
     files = STUDY_FILES if len(fitted) > 1 else STUDY_FILES[:1]
