@@ -16,6 +16,7 @@ from warpflat.garment.construction.edges import (
     Place,
     added,
     changed,
+    drawn_on,
     free_piece_name,
     lengths_of,
     new_piece,
@@ -224,9 +225,9 @@ def _with_strip(
     folded, (weft, warp), role = _STRIPS[wish.kind]
     high = wish.width * (2 if folded else 1)
     # Where the lines along which it buttons meet the edge.
-    lines = {stand.edge.removesuffix(f" {STAND}") for stand in stands if wish.overlap and not chain.closed}
+    centres = {stand.edge.removesuffix(f" {STAND}") for stand in stands if wish.overlap and not chain.closed}
     lapped = {
-        size: sorted(wish.share * at for line in lines for at in marks_of(pattern, chain, size, line))
+        size: sorted(wish.share * at for line in centres for at in marks_of(pattern, chain, size, line))
         for size in pattern.pieces
     }
     on_stands = all(len(row) > 1 for row in lapped.values())
@@ -263,16 +264,17 @@ def _with_strip(
                 for what, x in (("pleat lies here", hidden), ("pleat fold", stretch - hidden)):
                     x += number * stretch
                     drawn[f"{what} {number + 1}"] = np.array([[x, 0.0], [x, high]])
-        marks = {}
-        if wish.overlap:
-            # It buttons upon itself, in the middle of its outer half.
-            hole, *_, button = lapped[like.size] if on_stands else (0.5 * overlap, length + 0.5 * overlap)
-            marks["button"] = np.array([button, 0.5 * wish.width])
-            drawn |= buttonhole(np.array([hole, 0.5 * wish.width]), np.array([1.0, 0.0]))
-        return new_piece(
-            name, like, edges, role, quantity=count * panels, internal_lines=drawn, marks=marks,
+        made = new_piece(
+            name, like, edges, role, quantity=count * panels, internal_lines=drawn,
             grain=middle + np.outer([-reach, reach], (weft, warp)),
         )  # fmt: skip
+        if wish.overlap:
+            # It buttons upon itself, in the middle of its outer half; which end has what on stands is said of those.
+            hole, *_, button = lapped[like.size] if on_stands else (0.5 * overlap, length + 0.5 * overlap)
+            for at, there in ((button, hole), (hole, button))[: 2 if on_stands else 1]:
+                lines = buttonhole(np.array([there, 0.5 * wish.width]), np.array([1.0, 0.0]))
+                made = drawn_on(made, lines.items(), [("button", np.array([at, 0.5 * wish.width]))])
+        return made
 
     pattern = added(pattern, strip)
     size_notches: dict[str, tuple[float, ...]] = {}
