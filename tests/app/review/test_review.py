@@ -20,6 +20,7 @@ from warpflat.app.review.film import open_film
 from warpflat.app.review.page import verdict_words
 from warpflat.app.scene.load import make_scene
 from warpflat.app.scene.run import run_scene
+from warpflat.core.errors import StepError
 from warpflat.flat.flattening.fit_report import garment_wear
 from warpflat.flat.flattening.verdict import judge
 
@@ -188,6 +189,22 @@ def test_in_a_browser_the_slider_moves_the_mesh_and_no_request_leaves(run: Path,
     points = np.array(first[1].split(","), dtype=float).reshape(-1, 3)[:, :2] - source.offset[:2]
     np.testing.assert_allclose(points, source.positions(1), atol=2e-5)
     assert "example.com" not in log.read_text(errors="replace")
+
+
+def test_the_page_of_a_run_tells_what_it_lacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise StepError("it is too wide")
+
+    monkeypatch.setattr("warpflat.garment.construction.to_pattern.finish_edges", fail)
+    settings = {
+        "surface": {"shape": "dome", "resolution": 9},
+        "output": {"frames": 0},
+        "pattern": {"formats": ["json"]},
+    }
+    run_scene(make_scene(settings, name="trial", folder=tmp_path, where="trial"), tmp_path)
+    page = (tmp_path / "review.html").read_text(encoding="utf-8")
+    assert "Not done: the pattern has no finishing: it is too wide." in page
+    assert "At rest, no flipped faces" not in page
 
 
 def test_the_verdict_says_whether_it_fits_what_it_needs_and_no_knit_is_an_error() -> None:

@@ -182,6 +182,20 @@ def test_a_zip_through_two_seams_is_one_zip():
     assert notions(steps) == ("sewing thread", "1 invisible zip of 40 cm")
 
 
+def test_mirror_images_are_one_seam_whatever_the_numbers_of_their_edges():
+    """A dart at the shoulder parts it; the facing of the neck lies along what is the second part on the left alone."""
+    corners, names = corners_of(0.2, 0.05), ("neck", "shoulder right", "inner edge", "shoulder left 2")
+    front = polygon("front_facing", corners, names=names, role="facing")
+    back = polygon(
+        "back_facing", corners, names=("neck", "centre", "inner edge", "shoulder left"), role="facing", quantity=2
+    )
+    left = sewn("front_facing.shoulder left 2", "back_facing.shoulder left", "shoulder left of neck facing")
+    right = sewn("front_facing.shoulder right", "back_facing.shoulder left", "shoulder right of neck facing")
+    right = replace(right, sides=(right.sides[0], (replace(right.sides[1][0], mirrored=True),)))
+    garment = draft_garment(Pattern(name="p", pieces={"": [front, back]}, seams=[left, right]))
+    assert [(seam.count, seam.letter) for seam in sewn_seams(garment, "")] == [(2, "A")]
+
+
 def test_a_band_that_is_shorter_than_its_edge_is_stretched():
     band = FinishingTable(kind="band", edge="neck", width_mm=20, share=0.85)
     (step,) = [

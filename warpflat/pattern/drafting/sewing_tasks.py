@@ -490,10 +490,8 @@ def _mirror_groups(seams: Sequence[Seam]) -> list[list[Seam]]:
             alike |= dict.fromkeys(own, key)
             groups.setdefault(key, []).append(seam)
             continue
-        sides = sorted(
-            tuple(sorted((without_side(s.piece), without_side(s.edge)) for s in side)) for side in seam.sides
-        )
-        # A zip in one side alone makes it another seam than the other side.
+        sides = sorted(tuple(sorted((without_side(s.piece), line_name(s.edge)) for s in side)) for side in seam.sides)
+        # A zip in one side alone makes it another seam than the other side. Parts of an edge are numbered around the piece.
         groups.setdefault((without_side(seam.name), tuple(sides), seam.openings), []).append(seam)
     return list(groups.values())
 
