@@ -173,9 +173,26 @@ def test_below_a_stand_the_seam_may_bend():
     whole_draft(pattern)
 
 
-def test_a_facing_is_folded_in_before_a_waistband_is_sewn_over_its_end():
+@pytest.fixture(scope="module")
+def banded() -> Pattern:
+    """Trousers that button at the back, with a waistband that buttons."""
     garment = flat_form("trousers", OpeningTable(kind="buttons", seam="crotch back", length_mm=180, facing="separate"))
-    grown_on = OpeningTable(kind="buttons", seam="crotch back", length_mm=180)
+    grown_on = OpeningTable(kind="buttons", seam="crotch back", length_mm=180, width_mm=25)
     band = FinishingTable(kind="waistband", edge="waist", width_mm=35, overlap_mm=30)
-    steps = [step.technique for step in sewing_steps(draft_garment(opened(garment, grown_on, finishing=(band,))), "")]
+    return opened(garment, grown_on, finishing=(band,))
+
+
+def test_a_facing_is_folded_in_before_a_waistband_is_sewn_over_its_end(banded: Pattern):
+    steps = [step.technique for step in sewing_steps(draft_garment(banded), "")]
     assert steps.index("grown_facing") < steps.index("waistband_ends")
+
+
+def test_a_waistband_laps_as_the_stands_that_it_is_sewn_to(banded: Pattern):
+    """Closed, it goes around once, as the waist does: its button lies on the line of the other ones."""
+    band = banded.piece("waistband", "")
+    length = band.edge("lower").length
+    assert band.edge("upper").length == pytest.approx(length)
+    assert band.marks["button"][0] == pytest.approx(length - 0.025, abs=1e-3)
+    assert band.internal_lines["buttonhole"].mean(axis=0)[0] == pytest.approx(0.025, abs=1e-3)
+    # Either half may lie above, and so may either end.
+    assert band.marks["button 2"][0] == pytest.approx(band.internal_lines["buttonhole"].mean(axis=0)[0])
