@@ -196,6 +196,16 @@ def test_mirror_images_are_one_seam_whatever_the_numbers_of_their_edges():
     assert [(seam.count, seam.letter) for seam in sewn_seams(garment, "")] == [(2, "A")]
 
 
+def test_a_seam_with_the_copy_of_another_pair_is_sewn_on_both_sides():
+    """A hip pocket's bag lies behind its front, turned over; the crotch joins both fronts."""
+    front = polygon("front", corners_of(0.2, 0.3), quantity=2)
+    bag = polygon("front_pocket_bag", corners_of(0.2, 0.3), quantity=2, role="pocket")
+    seams = [sewn("front.e0", "front_pocket_bag.e0", "pocket opening"), sewn("front.e1", "front.e1", "crotch front")]
+    seams = [replace(seam, sides=(seam.sides[0], (replace(seam.sides[1][0], mirrored=True),))) for seam in seams]
+    garment = draft_garment(Pattern(name="p", pieces={"": [front, bag]}, seams=seams))
+    assert {seam.name: seam.count for seam in sewn_seams(garment, "")} == {"pocket opening": 2, "crotch front": 1}
+
+
 def test_a_band_that_is_shorter_than_its_edge_is_stretched():
     band = FinishingTable(kind="band", edge="neck", width_mm=20, share=0.85)
     (step,) = [

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from warpflat.core import FloatArray
 from warpflat.flat import triangulate
-from warpflat.garment.mannequin.body_landmarks import model_places, near_level, value_at
+from warpflat.garment.mannequin.body_landmarks import height_of, model_places
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body
 from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.fit_body import fit_body
@@ -75,7 +75,7 @@ class CommonBody:
             name=name,
             person=read.laid.fit.person,
             vertices=read.posed,
-            above={level: read.found[level].height - _landmark(level, read.body.vertices) for level in TRUNK},
+            above={level: read.found[level].height - height_of(level, read.body.vertices) for level in TRUNK},
             turn=turn,
             shift=shift,
             far=read.laid.far,
@@ -95,10 +95,7 @@ class CommonBody:
         for _ in range(_MOVES):
             arms = places.strips["arm left"] | places.strips["arm right"]
             own = np.array(
-                [
-                    np.mean([value_at(near_level(name, side), vertices[:, 1]) for side in ("left", "right")])
-                    for name in _LEVELS
-                ]
+                [np.mean([height_of(name, vertices, side) for side in ("left", "right")]) for name in _LEVELS]
             )
             move = np.interp(heights, own, [levels[name].height for name in _LEVELS] - own)
             vertices = vertices + np.outer(np.where(arms, 0.0, move), [0.0, 1.0, 0.0])
@@ -132,7 +129,7 @@ class CommonBody:
 
     def level(self, name: str) -> float:
         """Return the height [m] of a level of the trunk: bust, underbust, waist or hip, where its mannequin has it."""
-        return _landmark(name, self.vertices) + self.above.get(name, 0.0)
+        return height_of(name, self.vertices) + self.above.get(name, 0.0)
 
     def middle_in_file(self, name: str) -> FloatArray:
         """Return the middle of a level of the trunk, in the body's file [its unit]."""
@@ -154,10 +151,6 @@ class CommonBody:
             turn=other.turn,
             shift=other.shift,
         )
-
-
-def _landmark(level: str, vertices: FloatArray) -> float:
-    return float(value_at(near_level(level), vertices[:, 1]))
 
 
 def _towards_armholes(vertices: FloatArray, mannequin: Mannequin) -> FloatArray:
