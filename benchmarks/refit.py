@@ -26,7 +26,7 @@ from warpflat.flat.surface.triangles import triangulate
 from warpflat.garment.construction.carry import carry
 from warpflat.garment.construction.graded import graded_layout
 from warpflat.garment.construction.level_ease import level_ease, widened
-from warpflat.garment.mannequin.common_body import common_body_of_mannequin, skin_triangles
+from warpflat.garment.mannequin.common_body import CommonBody
 from warpflat.garment.mannequin.mannequin import Mannequin
 
 FORMS = ("basic_block", "tshirt", "a_line_skirt", "trousers")
@@ -41,9 +41,9 @@ def compare(form: str, first: str, second: str) -> str:
     used, number = np.unique(faces, return_inverse=True)
     garment = warpflat.make_surface(made[0].vertices[used], number.reshape(-1, 4), name="garment", weld=False)
     triangles = triangulate(garment.faces)[0].astype(np.int64)
-    one, other = (common_body_of_mannequin(body, name=size) for body, size in zip(bodies, (first, second), strict=True))
+    one, other = (CommonBody.of_mannequin(body, name=size) for body, size in zip(bodies, (first, second), strict=True))
     wearer = other.in_pose_of(one)
-    places = carry(garment, one.vertices, wearer.vertices, skin_triangles())
+    places = carry(garment, one.vertices, wearer.vertices, CommonBody.skin_triangles())
     before = level_ease(one, [(garment.vertices, triangles)])
     kept = {level: girths[0] - girths[1] for level, girths in before.items()}
     for _ in range(2):
@@ -80,9 +80,9 @@ def compare_patterns(form: str, first: str, second: str) -> str:
     faces = np.concatenate([piece.grid_vertices[piece.surface.faces] for piece in made[0].pieces.values()])
     used, number = np.unique(faces, return_inverse=True)
     garment = warpflat.make_surface(made[0].vertices[used], number.reshape(-1, 4), name="garment", weld=False)
-    one, other = (common_body_of_mannequin(body, name=size) for body, size in zip(bodies, (first, second), strict=True))
+    one, other = (CommonBody.of_mannequin(body, name=size) for body, size in zip(bodies, (first, second), strict=True))
     carried = np.zeros_like(made[0].vertices)
-    carried[used] = carry(garment, one.vertices, other.in_pose_of(one).vertices, skin_triangles())
+    carried[used] = carry(garment, one.vertices, other.in_pose_of(one).vertices, CommonBody.skin_triangles())
     missed, turned = np.zeros((0, 3)), np.zeros((0, 2))
     for name, piece in made[0].pieces.items():
         known, wanted = (pattern.pieces[name].positions for pattern in patterns)

@@ -16,7 +16,7 @@ from warpflat.app.scene.fit import FitJob
 from warpflat.garment.mannequin.body_model import finer_body
 from warpflat.pattern.export.dressed import Body, dress
 from warpflat.pattern.export.figure import drawn_page
-from warpflat.pattern.export.views import draw_row, view_from_side
+from warpflat.pattern.export.views import View, draw_row
 
 BODIES = ("EU 38", "EU 44", "men 54")
 CLOTH = (0.36, 0.52, 0.68)
@@ -40,7 +40,7 @@ def main(file: str) -> None:
                 # The form has vertices beyond the shirt.
                 room = carried.vertices[np.unique(faces[faces >= 0])]
                 points, facets, skin = dress(wearer, carried.vertices, faces.astype(np.int32), room)
-                view = view_from_side(points, facets, 0.0)
+                view = View.from_side(points, facets, 0.0)
                 view.points[: len(carried.vertices), 2] += NEARER
                 shades = np.concatenate([np.tile(CLOTH, (len(faces), 1)), skin])
                 middle = pen.width * (number + 0.5) / len(BODIES)

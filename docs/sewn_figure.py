@@ -17,7 +17,7 @@ from warpflat.pattern.drafting.layout import lay_out, nests
 from warpflat.pattern.export.dressed import Body, dress
 from warpflat.pattern.export.figure import Pen, write_figure
 from warpflat.pattern.export.pattern_json import read_pattern_json
-from warpflat.pattern.export.views import SIDES, draw_row, views_around
+from warpflat.pattern.export.views import SIDES, View, draw_row
 
 CLOTH = (0.36, 0.52, 0.68)
 # The cloth is drawn this much nearer than the body below it [m].
@@ -50,7 +50,7 @@ def main(file: str, folder: Path) -> None:
     vertices, body = mesh(film, "body")
     worn, cloth = mesh(film, "cloth")
     points, facets, skin = dress(Body(vertices=vertices, faces=body), worn, cloth)
-    views = views_around(points, facets, (SIDES[0], SIDES[-1]))
+    views = View.around(points, facets, (SIDES[0], SIDES[-1]))
     for view in views.values():
         view.points[: len(worn), 2] += NEARER
     shades = np.concatenate([np.tile(CLOTH, (len(cloth), 1)), skin])

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from warpflat.garment.mannequin.body_model import BodyModel, Person, rotation
-from warpflat.garment.mannequin.common_body import CommonBody, common_body_of_mannequin
+from warpflat.garment.mannequin.common_body import CommonBody
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.stand_body import StandingBody, stand_body
 
 __all__ = ["body_of_size", "built_once", "laid_once", "mean_person", "stood", "with_bent_elbows"]
 
-_from_size = Mannequin.from_size
+_from_size, _of_mannequin = Mannequin.from_size, CommonBody.of_mannequin
 
 
 @functools.cache
@@ -35,8 +35,8 @@ def body_of_size(resolution_mm: float, size: str = "EU 38") -> Mannequin:
 
 @functools.cache
 def laid_once(mannequin: Mannequin, *, name: str) -> CommonBody:
-    """In place of `common_body_of_mannequin`."""
-    return common_body_of_mannequin(mannequin, name=name)
+    """In place of `CommonBody.of_mannequin`."""
+    return _of_mannequin(mannequin, name=name)
 
 
 _stood: dict[object, StandingBody] = {}

@@ -60,7 +60,7 @@ def _others_work_once(request: pytest.FixtureRequest) -> Iterator[None]:
         patch.setattr("warpflat.garment.mannequin.read_body.stand_body", stood)
         if request.path.parent.name != "mannequin":
             patch.setattr("warpflat.garment.mannequin.mannequin.Mannequin.from_size", built_once)
-            patch.setattr("warpflat.garment.common_body_of_mannequin", laid_once)
+            patch.setattr("warpflat.garment.mannequin.common_body.CommonBody.of_mannequin", laid_once)
         if request.path.name not in ("test_tile_nesting.py", "test_pattern_marker.py", "test_matched_lay.py"):
             patch.setattr("warpflat.pattern.drafting.tile_nesting.orders", lambda masks: orders(masks)[:1])
         # What has crashed OpenUSD once is not read in this process.

@@ -59,6 +59,7 @@ from .output import expect_files as expect_files
 from .output import file_in as file_in
 from .output import has_seal as has_seal
 from .output import latest_file as latest_file
+from .output import notes_left_out as notes_left_out
 from .output import optional_file as optional_file
 from .output import optional_step as optional_step
 from .output import output_folder as output_folder

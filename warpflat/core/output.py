@@ -52,6 +52,7 @@ __all__ = [
     "file_in",
     "has_seal",
     "latest_file",
+    "notes_left_out",
     "optional_file",
     "optional_step",
     "output_folder",
@@ -633,11 +634,16 @@ def write_report(
         for run, known in recorded_files(read_result(before) if before.exists() else None).items()
     }
     record[name] = {**mine, **record.get(name, {})}
-    run = _run_into(folder)
-    steps = list(run.left_out) if run is not None and path.name == "metrics.json" else []
-    notes = {"notes": [step.note for step in steps], "left_out": [step.note for step in steps if step.is_needed]}
-    told = {key: list(dict.fromkeys(row)) for key, row in notes.items() if row}
+    told = notes_left_out(folder) if path.name == "metrics.json" else {}
     return write_sealed(path, {**data, **told, "files": {run: known for run, known in record.items() if known}})
+
+
+def notes_left_out(folder: Path) -> dict[str, list[str]]:
+    """Return the entries of `metrics.json` on what the run that writes into a folder has left out so far; none where there is nothing."""
+    run = _run_into(folder)
+    steps = [] if run is None else list(run.left_out)
+    notes = {"notes": [step.note for step in steps], "left_out": [step.note for step in steps if step.is_needed]}
+    return {key: list(dict.fromkeys(row)) for key, row in notes.items() if row}
 
 
 def remove_stale(

@@ -85,10 +85,6 @@ from .mannequin.card import needed_measurements as needed_measurements
 from .mannequin.card import write_measurement_card as write_measurement_card
 from .mannequin.closest import Mesh as Mesh
 from .mannequin.common_body import CommonBody as CommonBody
-from .mannequin.common_body import common_body_inside as common_body_inside
-from .mannequin.common_body import common_body_of_mannequin as common_body_of_mannequin
-from .mannequin.common_body import common_body_of_scan as common_body_of_scan
-from .mannequin.common_body import skin_triangles as skin_triangles
 from .mannequin.darts import FormDart as FormDart
 from .mannequin.darts import PlacedDart as PlacedDart
 from .mannequin.darts import dart_along as dart_along

@@ -117,11 +117,7 @@ from .export.views import Facets as Facets
 from .export.views import Shot as Shot
 from .export.views import View as View
 from .export.views import draw_row as draw_row
-from .export.views import make_facets as make_facets
-from .export.views import pattern_view as pattern_view
 from .export.views import row_size as row_size
-from .export.views import view_from_side as view_from_side
-from .export.views import views_around as views_around
 from .export.views import write_maps as write_maps
 from .export.walked_picture import write_walked_picture as write_walked_picture
 from .export.wear_words import RANGES as RANGES

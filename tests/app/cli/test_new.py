@@ -8,6 +8,7 @@ import pytest
 
 from warpflat.app.cli.main import main
 from warpflat.app.scene.load import load_scene
+from warpflat.pattern.export.figure import Pen
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
@@ -102,6 +103,17 @@ def test_a_first_project_needs_no_body_and_takes_a_measure_from_one(capsys: pyte
     assert run(capsys, "sun_hat", "--size", "men 50", "-o", str(file))[0] == 0
     assert load_scene(file).settings.surface.model_extra["head"] > 0.56
     assert run(capsys, "tote", "-o", str(tmp_path / "tote.toml"))[0] == 0
+
+
+@pytest.mark.parametrize("garment", ["shirt", "trousers"])
+def test_each_measure_of_a_card_is_in_its_picture(
+    garment: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    shown, written = list[str](), list[str]()
+    monkeypatch.setattr(Pen, "badge", lambda _, x, y, text, colour: shown.append(text))
+    monkeypatch.setattr(Pen, "write", lambda _, x, y, text, *more, **look: written.append(text))
+    assert run(capsys, garment, "--size", "EU 38", "--card", str(tmp_path / "card.png"))[0] == 0
+    assert sorted(shown, key=int) == [text for text in written if text.isdigit()]
 
 
 def test_card_shows_what_to_measure_and_keeps_what_is_there(capsys: pytest.CaptureFixture[str], tmp_path: Path):

@@ -20,6 +20,7 @@ from warpflat.app.review.film import open_film
 from warpflat.app.review.page import verdict_words
 from warpflat.app.scene.load import make_scene
 from warpflat.app.scene.run import run_scene
+from warpflat.core.errors import StepError
 from warpflat.flat.flattening.fit_report import garment_wear
 from warpflat.flat.flattening.verdict import judge
 
@@ -190,6 +191,22 @@ def test_in_a_browser_the_slider_moves_the_mesh_and_no_request_leaves(run: Path,
     assert "example.com" not in log.read_text(errors="replace")
 
 
+def test_the_page_of_a_run_tells_what_it_lacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise StepError("it is too wide")
+
+    monkeypatch.setattr("warpflat.garment.construction.to_pattern.finish_edges", fail)
+    settings = {
+        "surface": {"shape": "dome", "resolution": 9},
+        "output": {"frames": 0},
+        "pattern": {"formats": ["json"]},
+    }
+    run_scene(make_scene(settings, name="trial", folder=tmp_path, where="trial"), tmp_path)
+    page = (tmp_path / "review.html").read_text(encoding="utf-8")
+    assert "Not done: the pattern has no finishing: it is too wide." in page
+    assert "At rest, no flipped faces" not in page
+
+
 def test_the_verdict_says_whether_it_fits_what_it_needs_and_no_knit_is_an_error() -> None:
     strain = {"p95": 0.10}
     fit = {
@@ -217,6 +234,10 @@ def test_the_verdict_says_whether_it_fits_what_it_needs_and_no_knit_is_an_error(
     assert "10&nbsp;cm at the neck" in words
     words = words.replace("&nbsp;", " ")
     assert "Fits by its strain" in words
+    assert "At rest" in words
+    missing = told({"pieces": {"front": piece}, "left_out": ["it was not sewn"]})
+    assert "Not done: it was not sewn." in missing
+    assert "At rest" not in missing
     assert "needs an opening of 10 cm at the neck to be put on: 37.0 cm around, and 56.9 cm must pass (head)" in words
     assert "It can be put on" not in words
     # Where it was draped, the drape alone says whether it fits.

@@ -160,11 +160,13 @@ def test_without_its_body_one_is_fitted_inside(tmp_path: Path):
     # What its cloth cannot bear is told beside an ease that is kept.
     for fits, word in ((True, "yes"), (False, "no")):
         verdict = {"fits": fits, "words": f"{'fits' if fits else 'does not fit'} by its strain"}
-        metrics = {"pieces": {"front": {"area_m2": 0.5}}, "verdict": verdict}
-        ended = Fitted(carried=carried, folder=tmp_path, metrics=metrics, converged=True)
+        piece = {"area_m2": 0.5, "stages": [{"converged": True}], "flipped_faces": 0}
+        ended = Fitted(carried=carried, folder=tmp_path, metrics={"pieces": {"front": piece}, "verdict": verdict})
         assert ended.verdict().endswith("; it does not fit by its strain") is not fits
         assert study_table([ended, ended]).splitlines()[1].split()[-1] == word
         assert ended.row()["fits"] is fits
+        assert ended.row()["done"]
+        assert not replace(ended, metrics={**ended.metrics, "left_out": ["it was not sewn"]}).row()["done"]
     # Whatever the file's unit, the carried mesh is in metres.
     assert np.ptp(carried.vertices[:, 1]) == pytest.approx(0.55, abs=0.1)
 

@@ -89,6 +89,12 @@ def test_hem_lies_higher_at_its_lines():
         ("circle_skirt", {"flare": "9"}, "makes no sense"),
         ("shirt", {"closure": "zip-back"}, "with this collar, which opens in front"),
         ("shirt", {"closure": "zips"}, "unknown on a shirt"),
+        (
+            "chinos",
+            {"closure": "zip-side"},
+            "--closure zip-side lies where a chinos with these choices has its pockets",
+        ),
+        ("trousers", {"closure": "buttons-side", "pockets": "inseam"}, "has its pockets; take another side"),
         ("shirt", {"length": "shin"}, "no level at which it can end"),
         ("shirt", {"length": "hip+x"}, "a number from 0 to 30"),
         ("shirt", {"ease_knee": "3"}, "--ease-knee makes no sense on a shirt"),

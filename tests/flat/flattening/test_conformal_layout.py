@@ -6,6 +6,7 @@ import pytest
 from warpflat.flat.flattening.conformal_layout import conformal_layout
 from warpflat.flat.surface.cells import make_cells
 from warpflat.flat.surface.injective import is_injective
+from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.flat.surface.shapes import make_shape
 
 
@@ -17,6 +18,13 @@ def test_what_can_be_unrolled_keeps_its_lengths(triangles: bool) -> None:
     lengths, flat = (np.linalg.norm(p[a] - p[b], axis=1) for p in (surface.vertices, layout))
     np.testing.assert_allclose(flat, lengths, rtol=1e-3)
     assert is_injective(surface, layout)
+
+
+def test_the_places_of_the_border_that_are_farthest_apart_lie_level() -> None:
+    dome = make_shape("dome", resolution=9)
+    layout = conformal_layout(make_surface(dome.vertices * [3.0, 1.0, 0.0] + np.array([0.3, 0.0, 0.0]), dome.faces))
+    # The ends of one of the two diagonals.
+    assert np.abs(layout[[80, 72], 1] - layout[[0, 8], 1]).min() < 1e-9
 
 
 def test_angles_and_area_of_a_dome_are_kept() -> None:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from devices import DEVICE
 
 from warpflat.app.scene.read_layout import read_layout
+from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.flat.flattening.flatten_piece import flatten
+from warpflat.flat.flattening.harmonic_layout import harmonic_layout
 from warpflat.flat.flattening.start import choose_start
+from warpflat.flat.surface.as_rigid import as_rigid_layout
 from warpflat.flat.surface.injective import is_injective
+from warpflat.flat.surface.laplacian import laplacian_of
 from warpflat.flat.surface.shapes import make_shape
 
 
@@ -28,6 +34,23 @@ def test_triangles_start_from_as_rigid_iterations_and_grids_from_their_profiles(
     assert chord[1, 1] > chord[0, 1]
     grid = make_shape("bodice", resolution=21)
     assert choose_start(grid, grid.lines["centre"]).start == "the profiles development"
+
+
+def test_as_rigid_iterations_go_on_while_they_move_the_piece(monkeypatch: pytest.MonkeyPatch):
+    surface = bodice()
+    laplacian, layouts = laplacian_of(surface), [harmonic_layout(surface)]
+
+    def step(layout: FloatArray) -> FloatArray:
+        layouts.append(laplacian.as_rigid_step(layout))
+        return layouts[-1]
+
+    monkeypatch.setattr("warpflat.flat.surface.as_rigid.laplacian_of", lambda _: SimpleNamespace(as_rigid_step=step))
+    end = as_rigid_layout(surface, layouts[0])
+    assert end is layouts[-1]
+    moved = np.sqrt(np.mean(np.diff(layouts, axis=0) ** 2, axis=(1, 2)))
+    assert (moved > 1e-3 * np.linalg.norm(np.ptp(surface.vertices, axis=0))).tolist() == [True] * (len(moved) - 1) + [
+        False
+    ]
 
 
 def test_an_own_start_of_any_unit_side_and_angle_gives_the_same_pattern():

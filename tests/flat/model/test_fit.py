@@ -342,6 +342,12 @@ def test_a_sheet_shows_all_pieces_at_one_scale_of_length_and_of_colour(tmp_path:
     shown = np.array([each.pixels.shape[1::-1] for each in maps]) - 6
     sizes = np.array([np.ptp(result.positions, axis=0) for result in np.repeat(results, len(MAPS))])
     np.testing.assert_allclose(shown / sizes, shown[0, 1] / sizes[0, 1], rtol=0.02)
+    # The scale of the pressure is told in millimetres of mercury, too.
+    (bar,) = (axis for axis in figure.axes if axis.child_axes)
+    (mercury,) = bar.child_axes
+    figure.draw_without_rendering()
+    assert mercury.get_xlabel() == "mmHg"
+    np.testing.assert_allclose(mercury.get_xlim(), np.divide(bar.get_xlim(), 133.322), rtol=1e-9)
     told = " ".join(text.get_text() for text in page.texts)
     told = " ".join(told.split())
     assert "0.0 % held beyond its limit, 0.0 % in folds" in told

@@ -11,6 +11,7 @@ from warpflat.flat.fabric.library import find_fabric
 from warpflat.flat.flattening.harmonic_layout import harmonic_layout
 from warpflat.flat.model.network import SpringNetwork
 from warpflat.flat.solver.contact import Barrier, open_cracks, relax_with_contact
+from warpflat.flat.solver.energy import Energy
 from warpflat.flat.solver.grain import GrainAlignment
 from warpflat.flat.solver.options import RelaxOptions
 from warpflat.flat.solver.steps import Relaxation
@@ -104,6 +105,19 @@ def test_two_starts_come_to_minima_of_nearly_one_energy(model: str):
         assert certify(surface, state.positions(), NO_CUTS)
         energies.append(outcome.energies.potential)
     assert energies[0] == pytest.approx(energies[1], rel=0.03)
+
+
+def test_the_residual_is_the_largest_force_over_the_mean_force_of_a_spring():
+    surface, start = arc(0.5), flat_arc(0.45)
+    network = SpringNetwork.build(surface, find_fabric("isotropic"), start, grain_angle=0.0, device=DEVICE)
+    state = Relaxation(network, RelaxOptions(), start=start, alignments=[])
+    outcome = relax_with_contact(state, 5e-4)
+    assert outcome is not None
+    # Its sides are far apart.
+    force, springs = Energy(state).at(state.positions()).gradient, network.spring_arrays
+    length = np.linalg.norm(np.diff(state.positions()[springs.ends], axis=1)[:, 0], axis=1)
+    mean = np.mean(springs.stiffness * np.abs(length - springs.rest_length))
+    assert outcome.residual == pytest.approx(np.linalg.norm(force, axis=1).max() / mean, rel=1e-6)
 
 
 def test_a_start_that_lies_over_itself_is_refused():

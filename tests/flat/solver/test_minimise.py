@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from devices import DEVICE
@@ -9,9 +11,10 @@ from devices import DEVICE
 from warpflat.flat.fabric.library import find_fabric
 from warpflat.flat.flattening.flatten_piece import flatten
 from warpflat.flat.model.network import SpringNetwork
+from warpflat.flat.solver.energy import Energy
 from warpflat.flat.solver.grain import GrainAlignment
 from warpflat.flat.solver.metric import LaplacianFactor, Metric
-from warpflat.flat.solver.minimise import relax
+from warpflat.flat.solver.minimise import Cloth, relax
 from warpflat.flat.solver.options import RelaxOptions
 from warpflat.flat.solver.steps import Relaxation, relax_by_steps
 from warpflat.flat.surface.laplacian import laplacian_of
@@ -66,6 +69,27 @@ def test_the_laplacian_of_a_linear_field_is_zero_inside_and_its_energy_is_the_ar
     assert flat.vertices[:, 0] @ slope == pytest.approx(0.25)
     turned = flat.vertices[:, :2] @ [[0.6, 0.8], [-0.8, 0.6]]
     np.testing.assert_allclose(laplacian.as_rigid_step(turned), turned, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("model", "cheap", "expected"), [("membrane", 81, [15, 30, 60]), ("membrane", 80, []), ("springs", 81, [])]
+)
+def test_the_cloths_own_stiffness_becomes_the_metric_of_cells_again_and_again(model, cheap, expected, monkeypatch):
+    monkeypatch.setattr("warpflat.flat.solver.minimise.CHEAP", cheap)
+    surface = make_shape("dome", resolution=9)
+    network = SpringNetwork.build(
+        surface, find_fabric("isotropic"), surface.vertices[:, :2], device=DEVICE, model=model
+    )
+    grain = GrainAlignment(lower=4, upper=76)
+    state = Relaxation(network, RelaxOptions(), start=surface.vertices[:, :2], alignments=[grain])
+    cloth = Cloth(Energy(state), Metric(LaplacianFactor(network), [grain]))
+    positions, renewed = state.positions(), []
+    for iteration in range(100):
+        point = SimpleNamespace(energy=100.0 - iteration, positions=positions)
+        cloth.factor_stiffness(
+            SimpleNamespace(iterations=iteration, point=point, renew=lambda forget, at=iteration: renewed.append(at))
+        )
+    assert renewed == expected
 
 
 def test_contacts_and_the_chord_enter_the_metric_exactly():

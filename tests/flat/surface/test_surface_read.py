@@ -202,6 +202,7 @@ def test_missing_unit_is_asked_for_with_sizes(tmp_path, suffix):
     assert 'units = "m"' in message
     assert "--units m" in message
     assert '"cm": 0.4 x 0.6 x 0 m' in message
+    assert '"in": 1.02 x 1.52 x 0 m' in message
 
 
 @pytest.mark.parametrize(("unit", "metres"), [("m", 1), ("cm", 0.01), ("mm", 0.001), ("in", 0.0254), ("ft", 0.3048)])

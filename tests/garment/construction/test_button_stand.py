@@ -11,6 +11,7 @@ import shapely
 from flat_forms import flat_form, pattern_of, whole_draft
 
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import off_line
 from warpflat.garment.construction.button_stand import button_depths
 from warpflat.garment.construction.details import FinishingTable, OpeningTable
 from warpflat.garment.construction.garment import Garment
@@ -18,6 +19,7 @@ from warpflat.garment.construction.linings import add_interfacing
 from warpflat.garment.construction.openings import OpeningPart, place_opening
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.pieces import Pattern
+from warpflat.pattern.drafting.sewing_order import sewing_steps
 
 BUTTONED = OpeningTable(kind="buttons", seam="centre front", width_mm=20)
 FACING = FinishingTable(kind="facing", edge="neck", width_mm=55)
@@ -157,3 +159,40 @@ def test_keyhole_is_drawn_on_its_piece_and_on_its_facing(whole: Garment):
     assert larger.contains(around.intersection(shapely.Polygon(plain.piece("back", "").outline).buffer(-1e-4)))
     neck = next(ring for ring in replace(whole, openings=(hole,)).rings if ring.name == "neck")
     assert neck.opened == pytest.approx(0.24)
+
+
+def test_below_a_stand_the_seam_may_bend():
+    """Buttons at the back of trousers end above the crotch; held straight all along, its seam crossed itself."""
+    buttoned = OpeningTable(kind="buttons", seam="crotch back", length_mm=180, facing="separate")
+    pattern = opened(flat_form("trousers", buttoned), buttoned)
+    back = pattern.piece("back_left", "")
+    stand, below = back.edge("crotch back button stand"), back.edge("crotch back")
+    assert stand.length == pytest.approx(0.180, abs=2e-3)
+    assert float(off_line(below.points, below.points[[0, -1]]).max()) > 0.02
+    assert {seam.name for seam in pattern.seams} >= {"crotch back", "crotch front"}
+    whole_draft(pattern)
+
+
+@pytest.fixture(scope="module")
+def banded() -> Pattern:
+    """Trousers that button at the back, with a waistband that buttons."""
+    garment = flat_form("trousers", OpeningTable(kind="buttons", seam="crotch back", length_mm=180, facing="separate"))
+    grown_on = OpeningTable(kind="buttons", seam="crotch back", length_mm=180, width_mm=25)
+    band = FinishingTable(kind="waistband", edge="waist", width_mm=35, overlap_mm=30)
+    return opened(garment, grown_on, finishing=(band,))
+
+
+def test_a_facing_is_folded_in_before_a_waistband_is_sewn_over_its_end(banded: Pattern):
+    steps = [step.technique for step in sewing_steps(draft_garment(banded), "")]
+    assert steps.index("grown_facing") < steps.index("waistband_ends")
+
+
+def test_a_waistband_laps_as_the_stands_that_it_is_sewn_to(banded: Pattern):
+    """Closed, it goes around once, as the waist does: its button lies on the line of the other ones."""
+    band = banded.piece("waistband", "")
+    length = band.edge("lower").length
+    assert band.edge("upper").length == pytest.approx(length)
+    assert band.marks["button"][0] == pytest.approx(length - 0.025, abs=1e-3)
+    assert band.internal_lines["buttonhole"].mean(axis=0)[0] == pytest.approx(0.025, abs=1e-3)
+    # Either half may lie above, and so may either end.
+    assert band.marks["button 2"][0] == pytest.approx(band.internal_lines["buttonhole"].mean(axis=0)[0])

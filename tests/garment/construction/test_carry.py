@@ -16,13 +16,7 @@ from warpflat.flat.surface.triangles import triangulate
 from warpflat.garment.construction.carry import carry, carry_points
 from warpflat.garment.construction.level_ease import level_ease, widened
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation
-from warpflat.garment.mannequin.common_body import (
-    CommonBody,
-    common_body_inside,
-    common_body_of_mannequin,
-    common_body_of_scan,
-    skin_triangles,
-)
+from warpflat.garment.mannequin.common_body import CommonBody
 from warpflat.garment.mannequin.scan_pose import ScanOptions
 from warpflat.garment.mannequin.slicer import Slicer
 
@@ -71,10 +65,10 @@ def _layers(surface: Surface) -> list:
 def test_cloth_on_the_same_body_stays_and_goes_with_a_body_that_is_moved():
     body = _person()
     tunic = _tunic(body, 0.02)
-    same = carry(tunic, body.vertices, body.vertices, skin_triangles())
+    same = carry(tunic, body.vertices, body.vertices, CommonBody.skin_triangles())
     assert np.abs(same - tunic.vertices).max() < 1e-6
     turn = rotation(np.array([[0.0, 0.7, 0.0]]))[0]
-    moved = carry(tunic, body.vertices, body.vertices @ turn.T + [1.0, 0.2, -0.3], skin_triangles())
+    moved = carry(tunic, body.vertices, body.vertices @ turn.T + [1.0, 0.2, -0.3], CommonBody.skin_triangles())
     assert np.abs(moved - (tunic.vertices @ turn.T + [1.0, 0.2, -0.3])).max() < 2e-3
 
 
@@ -99,13 +93,13 @@ def test_a_form_carried_to_another_size_is_the_form_of_that_size():
     used, number = np.unique(faces, return_inverse=True)
     garment = make_surface(on_small.vertices[used], number.reshape(-1, 4), name="block", weld=False)
     assert len(garment.vertices) == len(used)
-    before, after = (common_body_of_mannequin(body, name="") for body in (small, large))
+    before, after = (CommonBody.of_mannequin(body, name="") for body in (small, large))
     for body, mannequin in ((before, small), (after, large)):
         for level in ("bust", "waist", "hip"):
             assert body.level(level) == pytest.approx(mannequin.levels()[level].height, abs=0.002)
     wearer = after.in_pose_of(before)
     carried = np.zeros_like(on_small.vertices)
-    carried[used] = carry(garment, before.vertices, wearer.vertices, skin_triangles())
+    carried[used] = carry(garment, before.vertices, wearer.vertices, CommonBody.skin_triangles())
     missed, grown = [], []
     for piece in on_small.pieces.values():
         for row in piece.edges.values():
@@ -122,7 +116,7 @@ def test_a_hem_that_lies_in_a_plane_stays_in_one():
     body, other = _person(), _person(first=2.0)
     tunic = _tunic(body, 0.02)
     # A fold upon the hem would show.
-    carried = carry(tunic, body.vertices, other.vertices, skin_triangles())
+    carried = carry(tunic, body.vertices, other.vertices, CommonBody.skin_triangles())
     for ring in (carried[:48], carried[-48:]):
         at = ring - ring.mean(axis=0)
         assert np.abs(at @ np.linalg.svd(at)[2][-1]).max() < 1e-6
@@ -163,10 +157,10 @@ def test_a_tape_passes_by_sleeves():
 def test_a_body_is_fitted_inside_a_garment():
     wearer = _person(first=0.7, scale=1.68)
     rows = (wearer.vertices[:, 1] > 0.75) & (wearer.vertices[:, 1] < 1.38)
-    triangles = skin_triangles()[rows[skin_triangles()].all(axis=1)]
+    triangles = CommonBody.skin_triangles()[rows[CommonBody.skin_triangles()].all(axis=1)]
     used, corners = np.unique(triangles, return_inverse=True)
     shell = wearer.vertices[used] + 0.006 * vertex_normals(wearer.vertices, finer_body()[1])[used]
-    found = common_body_inside(shell, corners.reshape(-1, 3), name="inside")
+    found = CommonBody.inside(shell, corners.reshape(-1, 3), name="inside")
     for level in ("bust", "waist", "hip"):
         assert found.level(level) == pytest.approx(wearer.level(level), abs=0.035)
     trunk = np.isin(np.arange(len(wearer.vertices)), used)
@@ -180,7 +174,7 @@ def test_a_scan_tells_how_it_came_upright():
     wearer = _person(first=0.5)
     # In centimetres, its head towards +z, facing -y.
     turned = 100.0 * wearer.vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0] + [30.0, 50.0, 7.0]
-    found = common_body_of_scan(turned, finer_body()[1], name="scan", options=ScanOptions(unit="cm"))
+    found = CommonBody.of_scan(turned, finer_body()[1], name="scan", options=ScanOptions(unit="cm"))
     placed = turned @ found.turn + found.shift
     assert np.median(np.linalg.norm(placed - found.vertices, axis=1)) < 0.01
     assert found.level("waist") == pytest.approx(wearer.level("waist") - wearer.vertices[:, 1].min(), abs=0.012)

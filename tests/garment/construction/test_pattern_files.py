@@ -243,6 +243,13 @@ def test_a_pattern_may_begin_with_a_byte_order_mark(tmp_path: Path):
     assert len(read_pattern_json(file).pieces[""]) == 1
 
 
+def test_a_format_that_there_is_not_is_refused(tmp_path: Path):
+    flat = flatten(make_shape("dome", resolution=5))
+    with pytest.raises(InputError, match="unknown format 'png'; valid: dxf"):
+        surface_files([flat], tmp_path, name="dome", options=PatternOptions(formats=("dxf", "png")))
+    assert not list(tmp_path.iterdir())
+
+
 def test_every_edge_that_a_cut_surface_has_may_be_named(tmp_path: Path):
     (tmp_path / "trial.toml").write_text(PARTED)
     run_scene(load_scene(tmp_path / "trial.toml"), tmp_path / "out")

@@ -177,6 +177,14 @@ def test_a_misfit_names_the_cut_that_may_take_it_up(worn: warpflat.Drape):
     assert dataclasses.replace(worn, cuts={"front": [("a dart", far)]}).places[0].words == place.words
 
 
+def test_frames_are_chosen_half_by_displacement_and_half_by_time():
+    # Fast for a quarter of the time, then slow.
+    moves = np.repeat([1.0, 0.01], [50, 150])
+    chosen = choose_frames(np.append(0.0, np.cumsum(moves)).astype(np.float32)[:, None, None])
+    assert (chosen[0], chosen[-1]) == (0, 200)
+    assert 0.5 < np.mean(np.array(chosen) <= 50) < 0.7
+
+
 def test_a_drape_writes_worn_pieces_and_a_picture(worn: warpflat.Drape, tmp_path: Path):
     names = warpflat.save_drape(worn, tmp_path, frames=True)
     assert names == ["front.draped.obj", "back.draped.obj", "drape.png", "frames.usdc", "drape.webp"]

@@ -525,12 +525,16 @@ def test_a_hood_is_draped_over_a_head(monkeypatch: pytest.MonkeyPatch):
         assert np.abs(begins[1][name][:, 0]).max() > 1.2 * far
 
 
-def placed_on(form: str, **more: object) -> tuple[FormGarment, dict[str, list[Surface]]]:
-    """A garment with finishing or pockets, and where these are worn."""
+def placed_on(form: str, *, turned: bool = False, **more: object) -> tuple[FormGarment, dict[str, list[Surface]]]:
+    """A garment with finishing or pockets, and where these are worn; `turned` draws the lines inside its pieces from their other ends."""
     mannequin = body_of_size(30.0)
     made = flatten_form(mannequin, mannequin.form(shipped_form(form)), fabric="woven", sewn=True, curves_mm=0.0)
     garment = replace(made, **more)  # type: ignore[arg-type]
     pattern, _ = pattern_of_garment({"": garment}, name=form)
+    if turned:
+        lines = [{name: line[::-1] for name, line in reversed(p.internal_lines.items())} for p in pattern]
+        pieces = [replace(piece, internal_lines=own) for piece, own in zip(pattern, lines, strict=True)]
+        pattern = replace(pattern, pieces={"": pieces})
     lifts = {
         name: surface_lift(flat.surface.vertices[flat.vertex_origin], flat.positions, triangulate(flat.faces)[0])
         for name, flat in garment.pieces.items()
@@ -557,9 +561,10 @@ def test_a_flounce_falls_from_its_edge_and_a_waistband_stands_on_it():
     assert (np.ptp(hem, axis=0) - np.ptp(edge, axis=0))[[0, 2]] == pytest.approx(2 * 0.4 * 0.186, abs=0.03)
 
 
-def test_a_patch_lies_on_its_piece():
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_patch_lies_on_its_piece(turned: bool):
     pocket = PocketTable(kind="patch", piece="front", width_mm=120, height_mm=100, line="abdomen", below_mm=10)
-    garment, worn = placed_on("skirt", pockets=[pocket])
+    garment, worn = placed_on("skirt", turned=turned, pockets=[pocket])
     (name,) = worn
     assert name == "front_pocket"
     cloth = garment.pieces["front"].surface.vertices

@@ -15,7 +15,7 @@ from warpflat.core.errors import InputError
 from warpflat.garment.mannequin.body_landmarks import PLACES, height_weights
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation
 from warpflat.garment.mannequin.closest import Mesh
-from warpflat.garment.mannequin.common_body import common_body_of_scan
+from warpflat.garment.mannequin.common_body import CommonBody
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.scan_pose import LANDMARKS, ScanOptions
 from warpflat.garment.mannequin.stand_body import StandingBody, stand_body
@@ -231,7 +231,7 @@ def _sitting(hip: float, knee: float, *, turned: float = 0.0) -> tuple[Person, n
 def test_a_body_that_sits_is_fitted_where_its_pose_is_kept(hip: float, knee: float) -> None:
     person, vertices = _sitting(hip, knee, turned=0.5)
     options = ScanOptions(keep_pose=True)
-    body = common_body_of_scan(vertices, finer_body()[1], name="rider", options=options)
+    body = CommonBody.of_scan(vertices, finer_body()[1], name="rider", options=options)
     assert body.far < 0.003
     model = BodyModel.load()
     for joint in ("upperleg01", "lowerleg01"):

@@ -24,7 +24,7 @@ from warpflat.core.errors import InputError
 from warpflat.garment.construction.level_ease import level_ease
 from warpflat.garment.mannequin.body_model import finer_body
 from warpflat.garment.mannequin.closest import Mesh
-from warpflat.garment.mannequin.common_body import common_body_of_scan
+from warpflat.garment.mannequin.common_body import CommonBody
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.measurements import measurements_from_size
 from warpflat.garment.mannequin.scan_pose import ScanOptions, turn_scan_upright
@@ -114,7 +114,7 @@ def test_the_fullest_chest_is_a_tape_of_its_own() -> None:
 def test_fit_has_the_levels_of_the_mannequin() -> None:
     for name in ("male", "gc_mean_female"):
         points, faces = scan(name)
-        body = common_body_of_scan(points, faces, name=name)
+        body = CommonBody.of_scan(points, faces, name=name)
         measures = scanned_body(name).measures
         girths = level_ease(body, [(body.vertices * [1.1, 1.0, 1.1], finer_body()[1])])
         assert set(girths) >= {"underbust", "waist"}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise, permutations
 from pathlib import Path
@@ -188,6 +189,8 @@ def test_an_end_that_nearly_reaches_a_seam_is_carried_on_and_one_inside_is_a_dar
     short = warpflat.SeamCut(name="front", points=((0.0, 0.004, 0.2), (0.0, 0.293, 0.162)))
     found = cut(skirt(), hip, short)
     assert lengths(found)["front"] == pytest.approx(0.3 * np.hypot(1.0, 0.13), rel=1e-3)
+    long = replace(short, points=((0.0, 0.004, 0.2), (0.0, 0.307, 0.16)))
+    assert lengths(cut(skirt(), hip, long)) == pytest.approx(lengths(found), rel=1e-3)
     dart = warpflat.SeamCut(name="slit", points=((0.0, 0.0, 0.2), (0.0, 0.2, 0.174)))
     note = next(note for note in cut(skirt(), hip, dart).notes if note.startswith("'slit' ends inside"))
     assert "101 mm from the nearest border or seam: a dart" in note

@@ -17,7 +17,7 @@ from warpflat.flat.surface.mesh import Surface
 from warpflat.garment.construction.sew_pieces import meeting_borders, unsewn_borders
 from warpflat.garment.seams.anatomy import averaged_limbs, find_anatomy
 from warpflat.garment.seams.find import FoundSeams, cloth_of
-from warpflat.garment.seams.thickness import even_line
+from warpflat.garment.seams.thickness import even_line, without_thickness
 
 SHIRTS = {
     "T-pose": {"arm": 0.0},
@@ -269,6 +269,17 @@ def test_thickness_drawn_at_a_hem_is_no_cloth() -> None:
     assert any("drawn thickness" in note for note in found.notes)
     area = sum(_area(piece) for piece in found.pieces)
     assert area == pytest.approx(_area(surface), rel=1e-6)
+
+
+@pytest.mark.parametrize(("share", "is_rim"), [(0.95, True), (0.8, False)])
+def test_a_narrow_rim_across_a_hem_is_no_cloth_and_a_wide_one_is(share: float, *, is_rim: bool) -> None:
+    surface = solids.skirt()
+    hem = np.arange(40)
+    rim = np.stack([np.roll(hem, -1), hem, hem + 640, np.roll(hem, -1) + 640], axis=1)
+    vertices = np.concatenate([surface.vertices, surface.vertices[hem] * [share, 1.0, share] + [0.0, 0.001, 0.0]])
+    kept, notes = without_thickness(cloth_of(warpflat.make_surface(vertices, [*surface.faces.tolist(), *rim.tolist()])))
+    assert bool(notes) == is_rim
+    assert (kept.face_areas.sum() == pytest.approx(_area(surface), rel=1e-6)) == is_rim
 
 
 def test_what_is_taken_off_at_an_opening_ends_in_an_even_line() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,12 +19,14 @@ from warpflat.flat.surface.connectivity import border_loops, euler_characteristi
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.tubes import tube_borders
 from warpflat.garment.construction.to_pattern import pattern_of_garment
-from warpflat.garment.seams.cloth import Cloth
-from warpflat.garment.seams.energy import _TRIAL, _can_be_sewn, _cut
+from warpflat.garment.seams.anatomy import find_anatomy
+from warpflat.garment.seams.by_hand import cut_by_hand
+from warpflat.garment.seams.cloth import Cloth, PieceMesh
+from warpflat.garment.seams.energy import _TRIAL, _can_be_sewn, _cut, _drawn
 from warpflat.garment.seams.fields import TriangleMesh
 from warpflat.garment.seams.find import FoundSeams, cloth_of
 from warpflat.garment.seams.lines import Line
-from warpflat.garment.seams.measure import Measured, laid_flat
+from warpflat.garment.seams.measure import Measured, laid_flat, remembered
 from warpflat.garment.seams.solid import _limbs as limbs_of
 from warpflat.garment.seams.solid import part_solids
 
@@ -281,9 +284,34 @@ def test_a_dart_that_all_but_parts_a_piece_is_not_made(leaves: float, fits: bool
     assert _can_be_sewn(made, dart, [before], [after], size=0.5) == fits
 
 
+@pytest.mark.parametrize(("name", "around"), [("waist", True), ("yoke", False)])
+def test_a_waist_goes_all_around_and_other_lines_through_one_piece(name: str, around: bool) -> None:
+    whole = solids.skirt()
+    sides = warpflat.SeamCut(name="side", plane=((0, 0, 0), (0, 0, 1)))
+    (parted,), _ = cut_by_hand([cloth_of(whole)], [whole], (sides,))
+    anatomy = find_anatomy(parted)
+    pieces = [laid(mesh) for mesh in parted.pieces()]
+    assert len(pieces) == 2
+    cloth = remembered(parted, pieces)
+    line = Line(name=name, normal=np.eye(3)[1], point=np.array([0.0, 0.35, 0.0]))
+    made = _drawn(cloth, pieces, 0, None, line, anatomy)
+    assert made is not None
+    assert made[1] == ({0, 1} if around else {0})
+    # The ellipse at that height, or the half of it that is one piece's.
+    turn = np.linspace(0.0, 2.0 * np.pi, 41)
+    ring = np.column_stack([0.21 * np.sin(turn), 0.1545 * np.cos(turn)])
+    length = float(np.linalg.norm(np.diff(ring, axis=0), axis=1).sum())
+    assert made[0].seam_length(_TRIAL) == pytest.approx(length if around else 0.5 * length, rel=0.02)
+    assert _drawn(cloth, pieces, 0, None, replace(line, point=np.ones(3)), anatomy) is None
+
+
 def laid_on_trial(cloth: Cloth) -> Measured:
     """Return the only piece of a cloth, laid flat."""
     (mesh,) = cloth.pieces()
+    return laid(mesh)
+
+
+def laid(mesh: PieceMesh) -> Measured:
     surface = mesh.as_surface()
     result = warpflat.flatten(surface, fabric="woven")
     return Measured(mesh=mesh, surface=surface, result=result, outside=0.0, energy=0.0, area=1.0)

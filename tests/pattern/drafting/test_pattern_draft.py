@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -583,6 +584,23 @@ def test_a_nest_on_paper_has_one_fold():
         if stroke.role == "fold" and not stroke.hidden
     ]
     assert seen == ["38"]
+
+
+def test_a_size_stands_on_its_own_line_alone_and_whole_on_a_sheet():
+    """Sizes 6 mm apart along their sides, of which the widest ends 3 mm beside a joint of two sheets."""
+    sizes = {f"US {6 + 2 * k}": [replace(polygon("front", corners_of(0.2 + 0.006 * k, 0.5)), size=f"US {6 + 2 * k}")]
+             for k in range(3)}  # fmt: skip
+    drafted = draft_garment(Pattern(name="skirt", pieces=sizes))
+    pieces = tuple(row[0] for row in drafted.pieces.values())
+    joint = np.array([(0.225, -0.1), (0.225, 0.6)])
+    drawings = draw_nest(pieces, OnPaper(joints=[joint]))
+    tags = [(drawing.piece, words) for drawing in drawings for words in drawing.words if words.tag]
+    assert len(tags) == 6
+    for piece, words in tags:
+        box = shapely.Polygon(words.box())
+        assert box.disjoint(shapely.LineString(joint))
+        assert [each.size for each in pieces if box.intersects(shapely.LinearRing(each.cut_line))] == [piece.size]
+        assert not any(box.intersects(shapely.Polygon(each.box())) for _, each in tags if each is not words)
 
 
 def test_a_piece_that_cannot_be_drawn_costs_itself_and_its_seams(monkeypatch: pytest.MonkeyPatch):

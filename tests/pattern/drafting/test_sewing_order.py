@@ -182,6 +182,30 @@ def test_a_zip_through_two_seams_is_one_zip():
     assert notions(steps) == ("sewing thread", "1 invisible zip of 40 cm")
 
 
+def test_mirror_images_are_one_seam_whatever_the_numbers_of_their_edges():
+    """A dart at the shoulder parts it; the facing of the neck lies along what is the second part on the left alone."""
+    corners, names = corners_of(0.2, 0.05), ("neck", "shoulder right", "inner edge", "shoulder left 2")
+    front = polygon("front_facing", corners, names=names, role="facing")
+    back = polygon(
+        "back_facing", corners, names=("neck", "centre", "inner edge", "shoulder left"), role="facing", quantity=2
+    )
+    left = sewn("front_facing.shoulder left 2", "back_facing.shoulder left", "shoulder left of neck facing")
+    right = sewn("front_facing.shoulder right", "back_facing.shoulder left", "shoulder right of neck facing")
+    right = replace(right, sides=(right.sides[0], (replace(right.sides[1][0], mirrored=True),)))
+    garment = draft_garment(Pattern(name="p", pieces={"": [front, back]}, seams=[left, right]))
+    assert [(seam.count, seam.letter) for seam in sewn_seams(garment, "")] == [(2, "A")]
+
+
+def test_a_seam_with_the_copy_of_another_pair_is_sewn_on_both_sides():
+    """A hip pocket's bag lies behind its front, turned over; the crotch joins both fronts."""
+    front = polygon("front", corners_of(0.2, 0.3), quantity=2)
+    bag = polygon("front_pocket_bag", corners_of(0.2, 0.3), quantity=2, role="pocket")
+    seams = [sewn("front.e0", "front_pocket_bag.e0", "pocket opening"), sewn("front.e1", "front.e1", "crotch front")]
+    seams = [replace(seam, sides=(seam.sides[0], (replace(seam.sides[1][0], mirrored=True),))) for seam in seams]
+    garment = draft_garment(Pattern(name="p", pieces={"": [front, bag]}, seams=seams))
+    assert {seam.name: seam.count for seam in sewn_seams(garment, "")} == {"pocket opening": 2, "crotch front": 1}
+
+
 def test_a_band_that_is_shorter_than_its_edge_is_stretched():
     band = FinishingTable(kind="band", edge="neck", width_mm=20, share=0.85)
     (step,) = [

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from polygons import polygon
 
 from warpflat.pattern.drafting.piece_parts import Dart, Edge
-from warpflat.pattern.drafting.pieces import Piece
+from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.drafting.whole_pieces import MIRRORED, whole_pieces
 
 
@@ -59,3 +61,14 @@ def test_both_sides_of_a_half_lie_at_its_levels_and_the_half_stays_as_it_was() -
     whole = whole_pieces([half], [], unsewn=True)[0]["front"]
     assert whole.levels == {"waist": "waist", "waist" + MIRRORED: "waist"}
     assert {edge.name for edge in whole.edges} > set(whole.levels)
+
+
+def test_a_band_around_both_sides_of_a_half_makes_no_second_one() -> None:
+    half = polygon("front", [(0, 0), (0.2, 0), (0.2, 0.4), (0, 0.4)], kinds=("hem", "seam", "seam", "fold"))
+    band = polygon("band", [(0, 0), (0.4, 0), (0.4, 0.1), (0, 0.1)], quantity=1)
+    side = SeamSide(piece="front", edge="e2")
+    around = (side, replace(side, reversed=True, mirrored=True))
+    seam = Seam(name="band", sides=((SeamSide(piece="band", edge="e0"),), around))
+    whole, (found,), _ = whole_pieces([half, band], [seam])
+    assert set(whole) == {"front", "band"}
+    assert [each.place for each in found.sides[1]] == [("front", "e2"), ("front", "e2" + MIRRORED)]

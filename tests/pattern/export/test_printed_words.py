@@ -9,7 +9,7 @@ from pathlib import Path
 import ezdxf
 import numpy as np
 import pytest
-from polygons import drafted, polygon
+from polygons import corners_of, drafted, polygon
 from pypdf import PdfReader
 from sample_dress import sample_dress
 
@@ -64,8 +64,16 @@ def test_files_carry_the_printed_name_and_keep_the_key(dress: DraftedGarment, tm
     assert f'data-piece="{dress.pieces["38"][0].name}"' in drawn
 
 
+def test_steps_in_inches_say_no_centimetres():
+    (step,) = sewing_steps(drafted(polygon("square", corners_of(0.2, 0.3), units="in")), "")
+    assert "strips cut on the bias, 1 3/8 in wide" in step.words
+    assert " cm" not in step.words
+
+
 def test_lengths_in_three_units_and_a_name_for_no_piece():
     assert [length_words(0.0095, units) for units in ("mm", "cm", "in")] == ["9.5 mm", "0.95 cm", "3/8 in"]
+    # A tape has sixteenths; a short length, such as an allowance, is not rounded to them.
+    assert [length_words(length, "in") for length in (0.7201, 0.025, 0.01)] == ["28 3/8 in", "1 in", "0.39 in"]
     with pytest.raises(InputError, match=r"names: there is no piece 'frnt'; did you mean 'front'\?"):
         check_names({"frnt": "Vorderteil"}, ["front", "back"])
 

@@ -42,7 +42,7 @@ def batch(file: Path, out: Path | None, workers: int, scheduler: str | None, qui
     """Run many scenes: bodies, fabrics and overrides of a batch file.
 
     A task whose result is there is not run again. Ctrl-C keeps what is done, and the same command goes on from there.
-    A task that fails ends none of the others; the exit code is 1 then.
+    A task that fails ends none of the others; the exit code is 1 then, and where a task is not at rest.
 
     Several workers and a scheduler need Dask: pip install ".[batch]" in a checkout.
 

@@ -23,8 +23,9 @@ __all__ = ["drape"]
 
 _FILES = """\b
   NAME.draped.obj  each piece as it is worn [m], with the pattern [m] as texture coordinates
-  drape.png        gap and strain from the front, the side and the back
-Of a pattern the last two and metrics.json come out alone."""
+  drape.png        gap, strain and shear from the front, the side and the back
+  drape.webp       how the cloth comes to rest
+Of a pattern these, frames.usdc and metrics.json come out alone."""
 
 
 @click.command(cls=ComputingCommand, epilog=f"{RUN_FILES}\n\n{_FILES}\n\n{EXIT_CODES}")

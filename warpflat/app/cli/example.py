@@ -10,7 +10,7 @@ from pathlib import Path
 
 import click
 
-from warpflat.app.cli.options import DONE, EXIT_CODES
+from warpflat.app.cli.options import DONE
 
 __all__ = ["example", "example_files"]
 
@@ -18,7 +18,7 @@ __all__ = ["example", "example_files"]
 _FOLDERS = tuple(place / "scenes" for place in (Path(__file__).parents[2], Path(__file__).parents[3]))
 
 
-@click.command(epilog=EXIT_CODES)
+@click.command()
 @click.argument("name", required=False)
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder.  [default: the current one]")
 def example(name: str | None, out: Path | None) -> int:

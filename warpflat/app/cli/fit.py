@@ -9,7 +9,6 @@ from typing import Any
 import click
 
 from warpflat.app.cli.options import (
-    DONE,
     EXIT_CODES,
     RUN_FILES,
     ComputingCommand,
@@ -166,9 +165,8 @@ def fit(
         if len(bodies) > 1 and output.tells:
             click.echo(f"{one.body}:")
         # Of JSON only that of all bodies is printed.
-        ended = report_run(result, to, replace(output, quiet=not output.tells, as_json=False))
-        code = max(code, ended)
-        fitted.append(Fitted(carried=one, folder=to, metrics=result.metrics, converged=ended == DONE))
+        code = max(code, report_run(result, to, replace(output, quiet=not output.tells, as_json=False)))
+        fitted.append(Fitted(carried=one, folder=to, metrics=result.metrics))
         if output.tells:
             click.echo(fitted[-1].verdict())
     written = write_study(folder, fitted)

@@ -36,7 +36,8 @@ EXIT_CODES = """\b
 Exit codes:
   0    done
   1    done, but it is no pattern yet: a piece did not converge, has flipped faces or lies over itself, in whatever size, the
-       sides of a drawn seam differ, or a step that the pattern needs had to be left out
+       sides of a drawn seam differ, a step that the pattern needs was left out, too much of a garment whose seams were found
+       is beyond the cloth's limit, or a drape is not at rest or stretches cloth by over 50 %
   2    bad input; one line says what is wrong, where, and what would be right
   70   an internal error, which is the program's own fault; WARPFLAT_TRACEBACK=1 prints its traceback
   129  the terminal was closed

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from warpflat.app.cli.options import DONE, EXIT_CODES, ComputingCommand, tell
+from warpflat.app.cli.options import DONE, ComputingCommand, tell
 
 if TYPE_CHECKING:
     from warpflat.app.scene.load import Scene
@@ -26,7 +26,7 @@ _BLOCK = {
 }
 
 
-@click.command(cls=ComputingCommand, epilog=EXIT_CODES)
+@click.command(cls=ComputingCommand)
 @click.argument("scene", metavar="[SCENE|MESH]", type=click.Path(path_type=Path), required=False)
 @click.option("--units", metavar="UNIT", help="Of a mesh that carries none: m, dm, cm, mm, in or ft.")
 @click.option("--fabric", metavar="NAME", help="Of a mesh.  [default: isotropic]")

@@ -20,9 +20,7 @@ from warpflat.pattern import (
     Scale,
     View,
     all_letters,
-    make_facets,
     outline_edges,
-    pattern_view,
     picture_of,
     write_moving_picture,
 )
@@ -91,8 +89,8 @@ def _images(pieces: Sequence[FilmPiece], times: Sequence[int], long_side: int) -
             counts = np.cumsum([0, *map(len, points)])
             joined = [np.where(faces >= 0, faces + first, -1) for faces, first in zip(shown, counts, strict=False)]
             together = np.concatenate(joined).astype(np.int32)
-            facets[numbers] = make_facets(together, outline_edges(together))
-        views.append(pattern_view(np.concatenate(points), facets[numbers], {}))
+            facets[numbers] = Facets.of(together, outline_edges(together))
+        views.append(View.of_pattern(np.concatenate(points), facets[numbers], {}))
         densities.append(np.concatenate([piece.density(time) for piece in pieces]))
     low = np.min([view.low for view in views], axis=0)
     size = np.max([view.low + view.size for view in views], axis=0) - low

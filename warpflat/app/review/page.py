@@ -305,7 +305,7 @@ def _cards(metrics: Mapping[str, Any]) -> str:
 
 def verdict_words(metrics: Mapping[str, Any]) -> str:
     """Return the verdict as HTML: done or not, whether it fits and why not, and what a maker should know."""
-    faults = faults_of(metrics)
+    faults = list(dict.fromkeys([*faults_of(metrics), *metrics.get("left_out", ())]))
     lines = [("bad", f"Not done: {_typeset(fault)}.") for fault in faults]
     verdict = metrics.get("verdict")
     findings = verdict["findings"] if verdict else []

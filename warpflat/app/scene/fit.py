@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.app.review.faults import is_done
 from warpflat.app.scene.load import make_scene, scene_fabric
 from warpflat.app.scene.options import COMMAND_LINE, errors_of_options
 from warpflat.core import (
@@ -169,7 +170,7 @@ class FitJob:
             InputError: a file cannot be read, is no body, or does not lie in the garment.
         """
         from warpflat.flat import triangulate
-        from warpflat.garment import Mesh, common_body_inside, read_garment, skin_triangles
+        from warpflat.garment import CommonBody, read_garment
 
         if front is not None and front not in _FRONTS:
             raise InputError(f"--front {quote_value(front)}: {nearest(front, _FRONTS)}")
@@ -192,7 +193,7 @@ class FitJob:
                     turn = np.array([[cosine, 0.0, -sine], [0.0, 1.0, 0.0], [sine, 0.0, cosine]]).T
                     layers = _outward(points, corners, turn, np.zeros(3))
                     joined = _joined(layers)
-                    inside = common_body_inside(*joined, name="the body inside")
+                    inside = CommonBody.inside(*joined, name="the body inside")
                     tried.append(
                         (inside.far * (1.0 if axis in ("+z", front) else _BACKWARDS), axis, turn, layers, inside)
                     )
@@ -203,7 +204,7 @@ class FitJob:
                     f"a body {stature:.2f} m tall was fitted inside the garment, which faces {axis}; --from BODY says which one it is"
                 )
         cloth = np.concatenate([vertices for vertices, _ in layers])
-        far = np.linalg.norm(Mesh(worn.vertices, skin_triangles()).closest(cloth)[2] - cloth, axis=1)
+        far = np.linalg.norm(worn.skin.closest(cloth)[2] - cloth, axis=1)
         if np.median(far) > _BESIDE:
             raise InputError(
                 f"{path}: half of it lies more than {100 * np.median(far):.0f} cm off {body or 'any body inside it'}; give the body on "
@@ -227,7 +228,7 @@ class FitJob:
         """
         from scipy.spatial import cKDTree
 
-        from warpflat.garment import Mesh, carry, level_ease, skin_triangles, widened
+        from warpflat.garment import CommonBody, carry, level_ease, widened
 
         posed = _common_body(body, "--to", keep_pose=keep_pose)
         wearer = posed.in_pose_of(self.body)
@@ -239,7 +240,7 @@ class FitJob:
             )
             for (vertices, triangles), layer in zip(self.layers, self.read.layers, strict=True)
         ]
-        moved = [carry(one, self.body.vertices, wearer.vertices, skin_triangles()) for one in cloths]
+        moved = [carry(one, self.body.vertices, wearer.vertices, CommonBody.skin_triangles()) for one in cloths]
         faces = [triangles for _, triangles in self.layers]
         before, after = level_ease(self.body, self.layers), level_ease(wearer, list(zip(moved, faces, strict=True)))
         for level in ease:
@@ -260,9 +261,8 @@ class FitJob:
         cloth, was = np.concatenate(moved), np.concatenate([vertices for vertices, _ in self.layers])
         deep = []
         for points, body_on in ((was, self.body), (cloth, wearer)):
-            skin = Mesh(body_on.vertices, skin_triangles())
-            face, _, place = skin.closest(points)
-            deep.append(float((np.einsum("pa,pa->p", points - place, skin.normals[face]) < -_WITHIN).mean()))
+            face, _, place = body_on.skin.closest(points)
+            deep.append(float((np.einsum("pa,pa->p", points - place, body_on.skin.normals[face]) < -_WITHIN).mean()))
         notes = []
         if deep[1] > deep[0] + _TOLD:
             notes.append(
@@ -272,7 +272,7 @@ class FitJob:
             down = float(wearer.vertices[:, 1].min() - posed.vertices[:, 1].min())
             sits = posed.vertices + np.array([0.0, down, 0.0])
             moved = [
-                carry(replace(one, vertices=vertices), wearer.vertices, sits, skin_triangles())
+                carry(replace(one, vertices=vertices), wearer.vertices, sits, CommonBody.skin_triangles())
                 for one, vertices in zip(cloths, moved, strict=True)
             ]
             cloth, wearer = np.concatenate(moved), replace(wearer, vertices=sits)
@@ -466,12 +466,11 @@ def fit_to(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fitted:
-    """What has come of a garment on one body: how it was carried, the folder and the metrics of its run, and whether that is fine."""
+    """What has come of a garment on one body: how it was carried, and the folder and the metrics of its run."""
 
     carried: Carried
     folder: Path
     metrics: Mapping[str, Any]
-    converged: bool
 
     @property
     def fits(self) -> bool | None:
@@ -495,7 +494,7 @@ class Fitted:
             "pieces": len(pieces),
             "area_m2": area,
             "fits": self.fits,
-            "done": self.converged,
+            "done": is_done(self.metrics),
         }
 
 
@@ -509,7 +508,7 @@ def write_study(folder: Path, fitted: Sequence[Fitted]) -> list[str]:
     from warpflat.core import output_folder, write_report
 
     entries = [
-        {**each.carried.as_dict(), "folder": str(each.folder), "fits": each.fits, "done": each.converged}
+        {**each.carried.as_dict(), "folder": str(each.folder), "fits": each.fits, "done": is_done(each.metrics)}
         for each in fitted
     ]
     files = STUDY_FILES if len(fitted) > 1 else STUDY_FILES[:1]
@@ -543,7 +542,7 @@ def study_table(fitted: Sequence[Fitted]) -> str:
 def _common_body(text: str, option: str, *, keep_pose: bool = False) -> CommonBody:
     """Return the body of a size, or of a scan's file, which may sit if its pose is to be kept."""
     from warpflat.flat import read_scan
-    from warpflat.garment import Mannequin, ScanOptions, common_body_of_mannequin, common_body_of_scan
+    from warpflat.garment import CommonBody, Mannequin, ScanOptions
 
     if not Path(text).suffix:
         if keep_pose:
@@ -551,14 +550,14 @@ def _common_body(text: str, option: str, *, keep_pose: bool = False) -> CommonBo
                 f"--keep-pose: {option} {quote_value(text)} is a size, which stands; give the file of a scan"
             )
         try:
-            return common_body_of_mannequin(Mannequin.from_size(text), name=text)
+            return CommonBody.of_mannequin(Mannequin.from_size(text), name=text)
         except InputError as error:
             raise InputError(f"{option}: {error}; or give the file of a scan") from None
     vertices, faces = read_scan(text)
     try:
         options = ScanOptions(keep_pose=keep_pose)
         name = make_file_name(Path(text).stem)
-        return common_body_of_scan(vertices, faces.astype(np.int64), name=name, options=options)
+        return CommonBody.of_scan(vertices, faces.astype(np.int64), name=name, options=options)
     except InputError as error:
         raise InputError(f"{option}: {text}: {error}") from None
 

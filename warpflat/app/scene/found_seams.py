@@ -161,11 +161,11 @@ def waist_of_body(path: Path, scale: float) -> tuple[float, float, float]:
         InputError: the file cannot be read as a mesh, or the mesh is no standing body.
     """
     from warpflat.flat import read_scan
-    from warpflat.garment import common_body_of_scan
+    from warpflat.garment import CommonBody
 
     vertices, faces = read_scan(path)
     with errors_named(str(path)):
-        body = common_body_of_scan(vertices, faces, name=path.stem)
+        body = CommonBody.of_scan(vertices, faces, name=path.stem)
     x, y, z = (scale * body.middle_in_file("waist")).tolist()
     return x, y, z
 

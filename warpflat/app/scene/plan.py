@@ -51,6 +51,7 @@ from warpflat.garment import (
     SeamTable,
     SeamWish,
     SewnPanel,
+    Straight,
     cap_wishes,
     check_edge_names,
     check_fold_grain,
@@ -582,7 +583,8 @@ def plan_garment(
             {name: piece.surface.lines for name, piece in form.pieces.items()},
             {name: piece.fold for name, piece in form.pieces.items() if piece.fold},
         )
-    constraints += [each for each in straight_stands(form, openings) if each not in constraints]
+    ruled = {(each.piece, each.line) for each in constraints if isinstance(each, Straight)}
+    constraints += [each for each in straight_stands(form, openings) if (each.piece, each.line) not in ruled]
     return GarmentPlan(
         scene=scene,
         drawing=drawing,

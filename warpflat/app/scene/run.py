@@ -24,6 +24,7 @@ from warpflat.core import (
     StepError,
     expect_files,
     latest_file,
+    notes_left_out,
     optional_file,
     optional_step,
     output_folder,
@@ -212,7 +213,14 @@ def _run(
             measured["verdict"] = verdict.as_dict()
         if reviewed:
             with optional_file(page, files):
-                write_review(folder, measured, tuple(files), name=scene.name, film=packed, pictures=shown)
+                write_review(
+                    folder,
+                    measured | notes_left_out(folder),
+                    tuple(files),
+                    name=scene.name,
+                    film=packed,
+                    pictures=shown,
+                )
 
     # The body belongs to the film.
     known = [*files, *([MANNEQUIN] if latest_file(folder / MANNEQUIN) != folder / MANNEQUIN else [])]

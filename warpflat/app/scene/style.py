@@ -326,6 +326,11 @@ def _with_closure(tables: dict[str, Any], text: str, garment: str) -> dict[str, 
         above = where == "front" or _hem(form, "trunk") in ("waist", "abdomen", "hip")
         if _body_part(form) == "leg" or (kind == "zip" and not (neck and above)):
             opening["length_mm"] = _LONG_ZIP if neck and where != "side" else _SHORT_ZIP
+        in_seam = [each for each in tables.get("pockets", ()) if each.get("seam") == opening["seam"]]
+        if any(each["kind"] == "hip" or each.get("below_mm", 0.0) < opening["length_mm"] for each in in_seam):
+            raise InputError(
+                f"--closure {text} lies where a {garment} with these choices has its pockets; take another side"
+            )
         kept.append(opening)
         if kind == "zip" and "length_mm" not in opening and where != "side":
             straight = {"line": opening["seam"], "straight": "warp"}

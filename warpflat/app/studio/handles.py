@@ -13,7 +13,7 @@ from warpflat.app.scene.cuts import asked_cuts, cut_of_dart, place_of
 from warpflat.app.scene.plan import GarmentPlan
 from warpflat.app.studio.cut_tables import rounded
 from warpflat.app.studio.solve import Solution
-from warpflat.core import FloatArray, IntArray, arc_lengths, unit
+from warpflat.core import FloatArray, arc_lengths, unit
 from warpflat.flat import Crack, border_of, seam_kind, triangulate
 from warpflat.garment import FormDart, Mesh, Neckline, PlacedDart, dart_part, select_bricks
 
@@ -105,13 +105,9 @@ def _of_darts(plan: GarmentPlan, name: str, flat: FloatArray) -> Iterator[Handle
         for side, leg, other in (("left", left, right), ("right", right, left)):
             place = flat[leg[mouth]]
             wider = partial(_widen_mouth, plan, dart, float(apart[mouth]))
-            yield _slid(f"mouth of {dart_name}, {side}", name, place, _across(axis, place - flat[other[mouth]]), wider)
-
-
-def _across(axis: FloatArray, outward: FloatArray) -> FloatArray:
-    """Return the direction at right angles to an axis that points the same way as `outward`."""
-    across = np.array([-axis[1], axis[0]])
-    return across if across @ outward >= 0.0 else -across
+            across = np.array([-axis[1], axis[0]])
+            across *= 1.0 if across @ (place - flat[other[mouth]]) >= 0.0 else -1.0
+            yield _slid(f"mouth of {dart_name}, {side}", name, place, across, wider)
 
 
 def _move_tip(plan: GarmentPlan, dart: PlacedDart, part: tuple[float, float], end: int, moved: float) -> dict[str, Any]:
@@ -250,7 +246,11 @@ def _move_end(
         low, high = (other + least, 1.0 - _INSIDE) if tip > other else (_INSIDE, other - least)
         cuts[number] = {**table, "part": sorted((round(other, 4), round(min(max(moved, low), high), 4)))}
         return {"cuts": cuts}
-    point = _on_surface(piece.network.surface.vertices, piece.network.surface.faces, flat, to)
+    # The place of the surface that lies there in the pattern, or nearest to it.
+    cut = piece.network.surface
+    triangles = triangulate(cut.faces)[0].astype(np.int64)
+    nearest, weights, _ = Mesh(np.pad(flat, [(0, 0), (0, 1)]), triangles).closest(np.append(to, 0.0)[None])
+    point = np.asarray(weights[0] @ cut.vertices[triangles[nearest[0]]])
     if not is_tip:
         border = surface.vertices[border_of(surface)]
         point = border[np.linalg.norm(border - point, axis=1).argmin()]
@@ -269,10 +269,3 @@ def _move_end(
         kept = {key: value for key, value in table.items() if key not in ("line", "part", "plane")}
         cuts[number] = {**kept, "name": name, **{key: rounded(ends[at]) for at, key in given}}
     return {"cuts": cuts}
-
-
-def _on_surface(vertices: FloatArray, faces: IntArray, flat: FloatArray, place: FloatArray) -> FloatArray:
-    """Return the point of a surface (#V by 3 [m]) that lies at a place (2) of its pattern (#V by 2), or nearest to it."""
-    triangles = triangulate(faces)[0].astype(np.int64)
-    nearest, weights, _ = Mesh(np.pad(flat, [(0, 0), (0, 1)]), triangles).closest(np.append(place, 0.0)[None])
-    return np.asarray(weights[0] @ vertices[triangles[nearest[0]]])

@@ -155,6 +155,8 @@ class SpringNetwork:
         else:
             springs = springs_of(surface, fabric, positions, grain_angle=grain_angle)
         if stretch is not None:
+            # Quads keep the stiffness of their shape on the body: with that of their flat shape, domes and saddles in knits and woven
+            # cloth lay farther from where the membrane has them.
             springs = shorten_springs(springs, surface, positions, axes, stretch)
         return cls(
             surface=surface,

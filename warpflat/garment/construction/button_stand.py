@@ -80,9 +80,9 @@ def with_button_stand(piece: Piece, name: str, opening: OpeningTable, end: float
     Raises:
         InputError: the edge is not straight.
     """
-    upper, edge, lower, out = _down_its_edge(piece, name, "have a button stand")
+    upper, edge, lower, out = _down_its_edge(piece, name, "have a button stand", end)
     top, low = edge.points[[0, -1]]
-    along = direction(edge.points)
+    along = direction(part_between(edge.points, 0.0, end))
     reach = _reflected(upper.points[::-1], top, out, opening.width)
     new = {upper.name: [replace(upper, points=joined(upper.points, reach))]}
     if end > edge.length - 1e-6:
@@ -91,7 +91,7 @@ def with_button_stand(piece: Piece, name: str, opening: OpeningTable, end: float
         below = []
     else:
         foot = top + end * along + np.outer([0.0, opening.width], out)
-        rest = edge.points[(edge.points - top) @ along > end + 1e-6]
+        rest = edge.points[arc_lengths(edge.points) > end + 1e-6]
         step = Edge(name=f"{name} {STAND_END}", points=foot[::-1])
         below = [step, replace(edge, points=np.vstack([foot[0], rest]))]
     new[name] = [Edge(name=f"{name} {STAND}", points=np.array([reach[-1], foot[-1]])), *below]
@@ -120,7 +120,7 @@ def with_wrap(piece: Piece, name: str, opening: OpeningTable) -> Piece:
     Raises:
         InputError: the edge is not straight, or one beside it is shorter than the wrap is wide.
     """
-    upper, edge, lower, out = _down_its_edge(piece, name, "be wrapped")
+    upper, edge, lower, out = _down_its_edge(piece, name, "be wrapped", np.inf)
     centre = edge.points
 
     def beyond(edge: Edge, line: FloatArray) -> FloatArray:
@@ -151,23 +151,24 @@ def with_wrap(piece: Piece, name: str, opening: OpeningTable) -> Piece:
     return trimmed(wrapped, wrapped.edges)
 
 
-def _down_its_edge(piece: Piece, name: str, what: str) -> tuple[Edge, Edge, Edge, FloatArray]:
+def _down_its_edge(piece: Piece, name: str, what: str, end: float) -> tuple[Edge, Edge, Edge, FloatArray]:
     """Return the edge above the straight one of a half, that itself, and the one below, walking down, and the direction beyond it.
 
     Raises:
-        InputError: the edge is not straight, so that the piece cannot do `what`.
+        InputError: the edge is not straight down to its `end` [m], so that the piece cannot do `what`.
     """
     before, after = beside(piece, name)
-    edge = piece.edge(name)
-    x, y = direction(edge.points)
-    stray = float(off_line(edge.points, edge.points[[0, -1]]).max())
+    edge, down = piece.edge(name), runs_down(piece, piece.edge(name).points)
+    straight = part_between(edge.points[:: 1 if down else -1], 0.0, end)[:: 1 if down else -1]
+    x, y = direction(straight)
+    stray = float(off_line(straight, straight[[0, -1]]).max())
     if stray > FOLD_STRAIGHT:
         raise InputError(
             f"{piece.name}.{name} strays {1e3 * stray:.1f} mm from straight and cannot {what}; constrain it, "
             f'[[constraints]] line = "{name}", straight = "warp"'
         )
     row = [replace(each, vertices=None) for each in (piece.edge(before), edge, piece.edge(after))]
-    upper, edge, lower = row if runs_down(piece, edge.points) else backwards(row)
+    upper, edge, lower = row if down else backwards(row)
     return upper, edge, lower, np.array([y, -x])
 
 

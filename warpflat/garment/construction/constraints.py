@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, IntArray, nearest, segment_lengths
+from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest, segment_lengths
 from warpflat.flat import grain_axes
 from warpflat.garment.construction.constraint_equations import (
     ConstraintEquations,
@@ -54,11 +55,13 @@ class Straight:
     Attributes:
         piece, line: names.
         along: "free" lets it take its direction, "warp" lays it parallel to the grain, "weft" at right angles to that.
+        reach: how far from its upper end it is straight [m]; all along if not given.
     """
 
     piece: str
     line: str
     along: Literal["free", "warp", "weft"] = "free"
+    reach: float = math.inf
     kind: ClassVar[str] = "straight"
 
     @property
@@ -216,6 +219,10 @@ def equations_of_constraint(
     if line[0] == line[-1]:
         raise InputError(f"{constraint.name}: the line is closed; it must run from one end to another")
     if isinstance(constraint, Straight):
+        if math.isfinite(constraint.reach):
+            down = surface.vertices[line[0], 1] >= surface.vertices[line[-1], 1]
+            line = line if down else line[::-1]
+            line = line[: 1 + np.searchsorted(arc_lengths(surface.vertices[line]), constraint.reach)]
         if constraint.along == "free":
             return straight_equations(line), False
         warp, weft = grain_axes(piece.grain_angle)
@@ -283,12 +290,16 @@ def straight_hems(form: FormResult, asked: Sequence[Constraint]) -> list[Straigh
     ]
 
 
-def straight_stands(form: FormResult, openings: Sequence[OpeningTable]) -> list[Constraint]:
-    """Return the constraints that lay the edges of button stands and wraps straight along the grain; a fold is so anyway."""
+def straight_stands(form: FormResult, openings: Sequence[OpeningTable]) -> list[Straight]:
+    """Return the constraints that lay the edges of button stands and wraps straight along the grain; a fold is so anyway.
+
+    Below a stand that ends within its seam, that may bend, as between the legs of trousers.
+    """
     return [
-        Straight(piece=name, line=opening.seam, along="warp")
+        Straight(piece=name, line=opening.seam, along="warp", reach=opening.length if alone else math.inf)
         for opening in openings
         if opening.kind in ("buttons", "wrap")
+        for alone in [sum(seam.edges[0] == opening.seam for seam in form.seams) == 1]
         for name, piece in form.pieces.items()
         if opening.seam in piece.edges and piece.fold != opening.seam
     ]

@@ -16,15 +16,30 @@ from warpflat.garment.construction.edges import (
     Place,
     added,
     changed,
+    drawn_on,
     free_piece_name,
     lengths_of,
     new_piece,
     sewn,
     sewn_places,
 )
-from warpflat.garment.construction.facings import Stand, centre_notch, is_beside, with_facings, with_stand_facings
+from warpflat.garment.construction.facings import (
+    STAND,
+    Stand,
+    centre_notch,
+    is_beside,
+    with_facings,
+    with_stand_facings,
+)
 from warpflat.garment.construction.flounces import with_flounce
-from warpflat.garment.construction.free_edges import Break, FreeChain, chain_allowance, chain_length, free_chains
+from warpflat.garment.construction.free_edges import (
+    Break,
+    FreeChain,
+    chain_allowance,
+    chain_length,
+    free_chains,
+    marks_of,
+)
 from warpflat.garment.construction.plackets import with_placket, with_slits
 from warpflat.garment.construction.shaped_band import shortened, slant_rises, with_shaped_waistband
 from warpflat.garment.construction.strips import NARROW, Strip, panel_count
@@ -119,7 +134,7 @@ def finish_edges(
                     if wish.kind == "flounce":
                         pattern = with_flounce(pattern, chain, wish.width, wish.turns, wish.edge, cloth_width)
                     else:
-                        pattern = _with_strip(pattern, wish, chain, count, cloth_width)
+                        pattern = _with_strip(pattern, wish, chain, count, cloth_width, stands)
     return pattern
 
 
@@ -195,9 +210,12 @@ def _girth_at(size: str, levels: Sequence[str], girths: Mapping[str, Mapping[str
     raise InputError(f"the body has no girth at {levels[0]!r}; {nearest(levels[0], own)}")
 
 
-def _with_strip(pattern: Pattern, wish: FinishingTable, chain: FreeChain, count: int, cloth_width: float) -> Pattern:
+def _with_strip(
+    pattern: Pattern, wish: FinishingTable, chain: FreeChain, count: int, cloth_width: float, stands: Sequence[Stand]
+) -> Pattern:
     """Return a pattern with one strip along a chain of free edges, cut `count` times.
 
+    Along button stands it laps as they do, and buttons where they button; else what runs past its end has the button.
     A strip that is wider than the cloth is cut as equal panels, of which one is drawn. One that is laid in pleats begins and ends in the
     inner fold of a pleat, and so does each of its panels: no seam of them shows.
     """
@@ -206,6 +224,14 @@ def _with_strip(pattern: Pattern, wish: FinishingTable, chain: FreeChain, count:
     allowances = {size: chain_allowance(pattern, chain, size) for size in pattern.pieces}
     folded, (weft, warp), role = _STRIPS[wish.kind]
     high = wish.width * (2 if folded else 1)
+    # Where the lines along which it buttons meet the edge.
+    centres = {stand.edge.removesuffix(f" {STAND}") for stand in stands if wish.overlap and not chain.closed}
+    lapped = {
+        size: sorted(wish.share * at for line in centres for at in marks_of(pattern, chain, size, line))
+        for size in pattern.pieces
+    }
+    on_stands = all(len(row) > 1 for row in lapped.values())
+    overlap = 0.0 if on_stands else wish.overlap
 
     def width_of(panels: int) -> float:
         return max(
@@ -223,13 +249,13 @@ def _with_strip(pattern: Pattern, wish: FinishingTable, chain: FreeChain, count:
         length, allowance = lengths[like.size] / panels, allowances[like.size]
         upper = {"binding": ("cut", 0.0), "ruffle": ("hem", NARROW)}.get(wish.kind, ("cut", allowance))
         edges = Strip(length=length, height=high).edges(
-            overlap=wish.overlap,
+            overlap=overlap,
             kinds={"overlap": "cut", "upper": upper[0], "right end": ends, "left end": ends},
             allowance={**dict.fromkeys(("lower", "right end", "left end", "overlap"), allowance), "upper": upper[1]},
         )
-        whole = length + wish.overlap
+        whole = length + overlap
         middle, reach = np.array([0.5 * whole, 0.5 * high]), 0.4 * (whole if warp == 0.0 else high)
-        lines = {"fold line": np.array([[0.0, wish.width], [whole, wish.width]])} if folded else {}
+        drawn = {"fold line": np.array([[0.0, wish.width], [whole, wish.width]])} if folded else {}
         if wish.pleat:
             # Knife pleats: half of what each takes lies at either end of its stretch.
             pleats = _pleat_count(wish, length)
@@ -237,16 +263,18 @@ def _with_strip(pattern: Pattern, wish: FinishingTable, chain: FreeChain, count:
             for number in range(pleats):
                 for what, x in (("pleat lies here", hidden), ("pleat fold", stretch - hidden)):
                     x += number * stretch
-                    lines[f"{what} {number + 1}"] = np.array([[x, 0.0], [x, high]])
-        marks = {}
-        if wish.overlap:
-            # It buttons upon itself, in the middle of its outer half.
-            marks["button"] = np.array([length + 0.5 * wish.overlap, 0.5 * wish.width])
-            lines |= buttonhole(np.array([0.5 * wish.overlap, 0.5 * wish.width]), np.array([1.0, 0.0]))
-        return new_piece(
-            name, like, edges, role, quantity=count * panels, internal_lines=lines, marks=marks,
+                    drawn[f"{what} {number + 1}"] = np.array([[x, 0.0], [x, high]])
+        made = new_piece(
+            name, like, edges, role, quantity=count * panels, internal_lines=drawn,
             grain=middle + np.outer([-reach, reach], (weft, warp)),
         )  # fmt: skip
+        if wish.overlap:
+            # It buttons upon itself, in the middle of its outer half; which end has what on stands is said of those.
+            hole, *_, button = lapped[like.size] if on_stands else (0.5 * overlap, length + 0.5 * overlap)
+            for at, there in ((button, hole), (hole, button))[: 2 if on_stands else 1]:
+                lines = buttonhole(np.array([there, 0.5 * wish.width]), np.array([1.0, 0.0]))
+                made = drawn_on(made, lines.items(), [("button", np.array([at, 0.5 * wish.width]))])
+        return made
 
     pattern = added(pattern, strip)
     size_notches: dict[str, tuple[float, ...]] = {}

@@ -44,7 +44,7 @@ def garment_files(
         found_seams: of a garment whose seams were found; their prices are printed.
 
     Raises:
-        InputError: a printed name is for no piece, or the folder cannot be written.
+        InputError: a printed name is for no piece, an unknown format, or the folder cannot be written.
     """
     from warpflat.garment.construction.to_pattern import pattern_of_garment
 
@@ -81,7 +81,7 @@ def surface_files(
         seams: the named seams of its border.
 
     Raises:
-        InputError: the folder cannot be written.
+        InputError: an unknown format, or the folder cannot be written.
     """
     from warpflat.garment.construction.to_pattern import pattern_of_surface
 

@@ -13,7 +13,7 @@ from warpflat.flat import vertex_normals
 from warpflat.garment.construction.carry import skin_under
 from warpflat.garment.mannequin.body_landmarks import model_places
 from warpflat.garment.mannequin.body_model import finer_body
-from warpflat.garment.mannequin.common_body import CommonBody, skin_triangles
+from warpflat.garment.mannequin.common_body import CommonBody
 from warpflat.garment.mannequin.profiles import convex_girth
 from warpflat.garment.mannequin.slicer import UP, Slicer
 
@@ -81,7 +81,9 @@ def widened(
     arm = (places.strips["arm left"] | places.strips["arm right"]).astype(float)
     out = []
     for vertices, triangles in layers:
-        near, weight, _ = skin_under(vertices, vertex_normals(vertices, triangles), body.vertices, skin_triangles())
+        near, weight, _ = skin_under(
+            vertices, vertex_normals(vertices, triangles), body.vertices, CommonBody.skin_triangles()
+        )
         way = unit(np.einsum("pk,pka->pa", weight, skin[near]) * [1.0, 0.0, 1.0])
         here = np.interp(vertices[:, 1], heights, off) * (1.0 - np.einsum("pk,pk->p", weight, arm[near]))
         out.append(vertices + here[:, None] * way)

@@ -210,7 +210,7 @@ def place_drafted(
         title = next((each.name for each in given if each.name in titles), "")
         outlines = [line for line_name, line in piece.internal_lines.items() if line_name.startswith("pocket")]
         for ring in shapely.get_parts(shapely.line_merge(shapely.MultiLineString(outlines))) if title else ():
-            corners = shapely.Polygon(ring).exterior.coords
+            corners = shapely.orient_polygons(shapely.Polygon(ring)).exterior.coords
             sides = [Edge(name=str(k), points=np.array(side)) for k, side in enumerate(pairwise(corners))]
             patch = mesh_pieces({title: Piece(name=title, edges=sides)}, [], _COARSE).meshes[title]
             at = whole[name](patch.points)

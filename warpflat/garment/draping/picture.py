@@ -25,11 +25,10 @@ from warpflat.pattern import (
     Facets,
     Scale,
     Shot,
+    View,
     drawn_page,
     dress,
     outline_edges,
-    view_from_side,
-    views_around,
     write_maps,
     write_moving_picture,
 )
@@ -54,7 +53,7 @@ def write_drape_picture(path: str | os.PathLike[str], drape: Drape) -> None:
     points, facets, skin = _dressed(drape)
     maps = {name: (scale, [found] * len(SIDES)) for name, (scale, [found]) in _maps([drape], [skin]).items()}
     del maps[_PRESSURE]
-    write_maps(path, title, views_around(points, facets), maps, tallest=8.0)
+    write_maps(path, title, View.around(points, facets), maps, tallest=8.0)
 
 
 def write_compared_drapes(path: str | os.PathLike[str], drapes: Mapping[str, Drape]) -> None:
@@ -64,7 +63,7 @@ def write_compared_drapes(path: str | os.PathLike[str], drapes: Mapping[str, Dra
         InputError: the file cannot be written.
     """
     dressed = {name: _dressed(drape) for name, drape in drapes.items()}
-    views = {name: view_from_side(points, facets, 0.0) for name, (points, facets, _) in dressed.items()}
+    views = {name: View.from_side(points, facets, 0.0) for name, (points, facets, _) in dressed.items()}
     maps = _maps(list(drapes.values()), [skin for _, _, skin in dressed.values()])
     write_maps(path, "", views, maps, tallest=4.2)
 
@@ -83,12 +82,12 @@ def write_drape_film(path: str | os.PathLike[str], drape: Drape) -> None:
     # All frames show the same room, as high as the picture.
     shown = np.concatenate([everything, dressed[facets.used[facets.used >= count]]])
     per_metre = (_FILM_HEIGHT - 2 * PIXELS_AROUND) / float(np.ptp(shown[:, 1]))
-    rooms = [shown @ view.directions.T for view in views_around(dressed, facets).values()]
+    rooms = [shown @ view.directions.T for view in View.around(dressed, facets).values()]
     pictures = []
     for number in choose_frames(drape.frames):
         points = drape.frames[number].astype(np.float64)
         colours = np.concatenate([scale.rgb(corner_means(drape.body.gaps(points), drape.cloth.faces)), skin])
-        views = views_around(np.concatenate([points, dressed[count:]]), facets).values()
+        views = View.around(np.concatenate([points, dressed[count:]]), facets).values()
         shots = [
             Shot(view, per_metre, low=room.min(axis=0), size=np.ptp(room, axis=0))
             for view, room in zip(views, rooms, strict=True)

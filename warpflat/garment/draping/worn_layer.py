@@ -45,7 +45,10 @@ def in_one_layer(
         The pieces and seams that are draped, and notes.
     """
     seams = list(seams)
-    out = {name for name, piece in pieces.items() if piece.role in _WITHIN or _is_binding(piece)} | _bags(pieces, seams)
+    out = {name for name, piece in pieces.items() if piece.role in _WITHIN or _is_binding(piece)}
+    # The bag of a pocket that takes part in a seam beside the shell lies behind a cut-off corner of it, and stays.
+    beside = {side.piece for seam in seams for chain in seam.sides if len(chain) > 1 for side in chain}
+    out |= {name for name, piece in pieces.items() if piece.role == "pocket" and name not in beside}
     # The second layer of a collar, sewn to the first one alone, has no place of its own.
     pairs = [{side.piece for side in seam.stretches} for seam in seams]
     layers = {name for name in pieces if name.endswith(MIRRORED) and name.removesuffix(MIRRORED) not in lifted}
@@ -78,12 +81,6 @@ def in_one_layer(
 def _is_binding(piece: Piece) -> bool:
     """Return whether a strip is turned around the edge to which it is sewn: its other edge is folded over as it is cut."""
     return piece.role == "strip" and any(edge.kind == "cut" and edge.allowance == 0.0 for edge in piece.edges)
-
-
-def _bags(pieces: Mapping[str, Piece], seams: Sequence[Seam]) -> set[str]:
-    """Return bags of pockets: that which takes part in a seam beside the shell lies behind a cut-off corner of it, and stays."""
-    beside = {side.piece for seam in seams for chain in seam.sides if len(chain) > 1 for side in chain}
-    return {name for name, piece in pieces.items() if piece.role == "pocket" and name not in beside}
 
 
 def _cut_off_corners(

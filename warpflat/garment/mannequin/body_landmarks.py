@@ -23,6 +23,7 @@ __all__ = [
     "PLACES",
     "Places",
     "crotch_vertex",
+    "height_of",
     "height_weights",
     "meeting",
     "model_places",
@@ -178,3 +179,8 @@ def value_at(near: tuple[NDArray[np.int64], FloatArray], values: FloatArray) -> 
     rows, off = near
     line = np.linalg.lstsq(np.column_stack([np.ones_like(off), off]), values[rows], rcond=None)[0]
     return np.asarray(line[0])
+
+
+def height_of(name: str, vertices: FloatArray, side: str = "left") -> float:
+    """Return how high a level of LEVELS lies on a body of these vertices (#V by 3 [m]) [m]."""
+    return float(value_at(near_level(name, side), vertices[:, 1]))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import IntArray
+from warpflat.core import FloatArray, unit
 from warpflat.garment.mannequin.bricks import TRUNK_LEVELS
 from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS
 from warpflat.garment.mannequin.picture import body_views
@@ -129,23 +129,24 @@ def write_measurement_card(
             body_views(mannequin, (("", 0.0), (" ", 180.0))),
             np.tile(SKIN, (len(mannequin.layout.body_faces), 1)),
         )
-        wide, high = views[""].size[:2].tolist()
-        scale = _HEIGHT / high
+        # From the floor to the crown, though the body has neither feet nor a head.
+        wide, scale = float(views[""].size[0]), _HEIGHT / mannequin.lengths["stature"]
         gap = 0.5 * _PAGE[0] - wide * scale
-        bodies = draw_row(
-            pen, views, [shades] * 2, left=0.5 * gap, bottom=_TOP - _HEIGHT, inches_per_metre=scale, gap=gap
-        )
+        bottom = _TOP - _HEIGHT + scale * float(views[""].low[1])
+        bodies = draw_row(pen, views, [shades] * 2, left=0.5 * gap, bottom=bottom, inches_per_metre=scale, gap=gap)
+        beyond = _beyond(mannequin)
         for drawn, is_behind in zip(bodies, (False, True), strict=True):
             view, names = drawn.view, [name for name in needed if (name in _BEHIND) is is_behind]
-            tapes = {
-                name: drawn.to_page(view.points[ids]) for name in names if (ids := _tape(mannequin, name)) is not None
-            }
+            for name in [name for name in names if name in beyond]:
+                pen.line(drawn.to_page(beyond[name][0] @ view.directions.T), width=0.7, colour=GREY)
+            tapes = {name: drawn.to_page(_tape(mannequin, name) @ view.directions.T) for name in names}
             for line in tapes.values():
                 pen.line(line, width=1.6, colour=_LINE, halo=True)
             for name, line in tapes.items():
-                # A number lies on its tape: in the middle of a girth, half-way along a length.
+                # A number lies on its tape: in the middle of a girth, half-way along a length, but where another one lies there.
+                at = {"bust_points": 0, "arm_length": 2 * len(line) // 3}
                 closed = np.allclose(line[0], line[-1])
-                x, y = (line.min(axis=0) + line.max(axis=0)) / 2 if closed else line[len(line) // 2]
+                x, y = (line.min(axis=0) + line.max(axis=0)) / 2 if closed else line[at.get(name, len(line) // 2)]
                 pen.badge(float(x), float(y), str(number[name]), _LINE)
         row = min(0.27, 5.1 / max(len(number), 1))
         y = _TOP - _HEIGHT - 0.35
@@ -166,12 +167,40 @@ def write_measurement_card(
             pen.write(0.5, 0.28, words, 8.5, color=GREY, fontstyle="italic")
 
 
-def _tape(mannequin: Mannequin, name: str) -> IntArray | None:
-    """Return the vertices along a tape; None where it lies on no line of the body."""
-    lines, at = mannequin.layout.lines, mannequin.vertices
+def _beyond(mannequin: Mannequin) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Return outlines of what the body lacks and is measured, head, hand and foot, and the tapes around them (#P by 3 [m] each)."""
+    lines, at, tall = mannequin.layout.lines, mannequin.vertices, mannequin.lengths["stature"]
+    elbow, wrist, ankle = (at[lines[name]].mean(axis=0) for name in ("elbow left", "wrist left", "ankle left"))
+    along, up = unit(wrist - elbow), np.array([0.0, 1.0, 0.0])
+    # Their middles, half of their lengths and widths, and how far the tape lies beyond the middle.
+    shapes = {
+        "head": (up * 0.935 * tall, 0.065 * tall * up, 0.046 * tall, 0.3),
+        "hand": (wrist + 0.05 * tall * along, 0.05 * tall * along, 0.022 * tall, 0.2),
+        "foot": (ankle * [1.0, 0.5, 1.0], 0.5 * ankle * up, 0.026 * tall, 0.0),
+    }
+    turn, found = np.linspace(0.0, 2.0 * np.pi, 49), {}
+    for name, (middle, reach, half, off) in shapes.items():
+        across = half * unit(np.array([reach[1], -reach[0], 0.0]))
+        around = middle + np.outer(np.cos(turn), reach) + np.outer(np.sin(turn), across)
+        wide = np.sqrt(1.0 - off**2)
+        found[name] = around, middle + off * reach + np.outer([-wide, 0.0, wide], across)
+    return found
+
+
+def _tape(mannequin: Mannequin, name: str) -> FloatArray:
+    """Return the points along a tape (#P by 3 [m])."""
+    layout, at = mannequin.layout, mannequin.vertices
     if name in ("nape_to_waist", "armscye_depth"):
-        back, neck = lines["centre back"], float(at[lines["neck"], 1].max())
-        low = at[lines["waist"], 1].mean() if name == "nape_to_waist" else at[lines["underarm left"][0], 1]
-        kept = back[(at[back, 1] <= neck) & (at[back, 1] >= low - 1e-6)]
-        return kept if len(kept) > 1 else None
-    return lines[_LINES[name]] if name in _LINES else None
+        back, neck = layout.lines["centre back"], float(at[layout.lines["neck"], 1].max())
+        low = (
+            at[layout.lines["waist"], 1].mean() if name == "nape_to_waist" else at[layout.lines["underarm left"][0], 1]
+        )
+        return at[back[(at[back, 1] <= neck) & (at[back, 1] >= low - 1e-6)]]
+    if name == "bust_points":
+        row = layout.rings[layout.level_row["bust"]]
+        return at[row[np.arange(-layout.to_princess, layout.to_princess + 1) % len(row)]]
+    if name == "stature":
+        # Beside the body, to its right.
+        aside = float(at[layout.body_faces.ravel(), 0].min()) - 0.03
+        return np.array([(aside, share * mannequin.lengths["stature"], 0.0) for share in (0.0, 0.5, 1.0)])
+    return at[layout.lines[_LINES[name]]] if name in _LINES else _beyond(mannequin)[name][1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from warpflat.core import FloatArray
 from warpflat.flat import triangulate
-from warpflat.garment.mannequin.body_landmarks import model_places, near_level, value_at
+from warpflat.garment.mannequin.body_landmarks import height_of, model_places
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body
 from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.fit_body import fit_body
@@ -24,7 +24,7 @@ from warpflat.garment.mannequin.scan_pose import ScanOptions
 from warpflat.garment.mannequin.slicer import UP, Slicer
 from warpflat.garment.mannequin.stand_body import lay_on_scan
 
-__all__ = ["CommonBody", "common_body_inside", "common_body_of_mannequin", "common_body_of_scan", "skin_triangles"]
+__all__ = ["CommonBody"]
 
 
 # Levels that a mannequin and the model both have.
@@ -55,9 +55,81 @@ class CommonBody:
     shift: FloatArray = field(default_factory=lambda: np.zeros(3))
     far: float = 0.0
 
+    @classmethod
+    def of_scan(
+        cls, vertices: FloatArray, faces: NDArray[np.integer[Any]], *, name: str, options: ScanOptions | None = None
+    ) -> CommonBody:
+        """Return the body of a scan, in the scan's pose.
+
+        Args:
+            vertices: #V by 3, any unit. faces: #F by 3 or 4 (-1 in the last column for a triangle).
+            name: of the body.
+            options: what is known of the scan.
+
+        Raises:
+            InputError: it is no standing body with arms and legs.
+        """
+        read = read_body(np.asarray(vertices, float), np.asarray(faces, dtype=np.int64), options or ScanOptions())
+        turn, shift = read.placed
+        return cls(
+            name=name,
+            person=read.laid.fit.person,
+            vertices=read.posed,
+            above={level: read.found[level].height - height_of(level, read.body.vertices) for level in TRUNK},
+            turn=turn,
+            shift=shift,
+            far=read.laid.far,
+        )
+
+    @classmethod
+    def of_mannequin(cls, mannequin: Mannequin, *, name: str) -> CommonBody:
+        """Return the body of a mannequin of a size or of measurements; head, hands and feet, which it lacks, are the model's."""
+        triangles = triangulate(np.asarray(mannequin.layout.faces))[0].astype(np.int64)
+        # Without head and feet the model would slide up or down.
+        levels = mannequin.levels()
+        fit = fit_body(mannequin.vertices, triangles, {name: levels[name].height for name in _LEVELS})
+        mesh = Mesh(mannequin.vertices, triangles)
+        vertices, _ = lay_on_scan(finer_body()[0] @ BodyModel.load().vertices(fit.person), mesh)
+        # Laid on the mannequin its levels are some millimetres off: they go where the mannequin has them, and what lies between follows.
+        places, heights = model_places(), vertices[:, 1]
+        for _ in range(_MOVES):
+            arms = places.strips["arm left"] | places.strips["arm right"]
+            own = np.array(
+                [np.mean([height_of(name, vertices, side) for side in ("left", "right")]) for name in _LEVELS]
+            )
+            move = np.interp(heights, own, [levels[name].height for name in _LEVELS] - own)
+            vertices = vertices + np.outer(np.where(arms, 0.0, move), [0.0, 1.0, 0.0])
+            vertices, _ = lay_on_scan(vertices, mesh)
+            heights = vertices[:, 1]
+        # So would the ends of its shoulders and its underarms: a table may have both where no body of that girth has them.
+        for _ in range(_MOVES):
+            vertices, _ = lay_on_scan(vertices + _towards_armholes(vertices, mannequin), mesh)
+        far = float(fit.distance[np.isfinite(fit.distance)].mean())
+        return cls(name=name, person=fit.person, vertices=vertices, far=far)
+
+    @classmethod
+    def inside(cls, vertices: FloatArray, triangles: NDArray[np.int64], *, name: str) -> CommonBody:
+        """Return the body that may wear a garment (#V by 3 [m], Y up, front +Z; #T by 3, outward)."""
+        fit = fit_inside(vertices, triangles)
+        model, finer = BodyModel.load(), finer_body()[0]
+        return cls(name=name, person=fit.person, vertices=finer @ model.vertices(fit.person))
+
+    @staticmethod
+    @lru_cache(maxsize=1)
+    def skin_triangles() -> NDArray[np.int64]:
+        """Return the triangles of the common mesh that cloth lies over: without head, hands and feet."""
+        finer, triangles = finer_body()
+        plain = finer @ BodyModel.load().detail.astype(float) < 0.5
+        return triangles[plain[triangles].all(axis=1)]
+
+    @cached_property
+    def skin(self) -> Mesh:
+        """What cloth lies over."""
+        return Mesh(self.vertices, self.skin_triangles())
+
     def level(self, name: str) -> float:
         """Return the height [m] of a level of the trunk: bust, underbust, waist or hip, where its mannequin has it."""
-        return _landmark(name, self.vertices) + self.above.get(name, 0.0)
+        return height_of(name, self.vertices) + self.above.get(name, 0.0)
 
     def middle_in_file(self, name: str) -> FloatArray:
         """Return the middle of a level of the trunk, in the body's file [its unit]."""
@@ -79,65 +151,6 @@ class CommonBody:
             turn=other.turn,
             shift=other.shift,
         )
-
-
-def common_body_of_scan(
-    vertices: FloatArray, faces: NDArray[np.integer[Any]], *, name: str, options: ScanOptions | None = None
-) -> CommonBody:
-    """Return the body of a scan, in the scan's pose.
-
-    Args:
-        vertices: #V by 3, any unit. faces: #F by 3 or 4 (-1 in the last column for a triangle).
-        name: of the body.
-        options: what is known of the scan.
-
-    Raises:
-        InputError: it is no standing body with arms and legs.
-    """
-    read = read_body(np.asarray(vertices, float), np.asarray(faces, dtype=np.int64), options or ScanOptions())
-    turn, shift = read.placed
-    return CommonBody(
-        name=name,
-        person=read.laid.fit.person,
-        vertices=read.posed,
-        above={level: read.found[level].height - _landmark(level, read.body.vertices) for level in TRUNK},
-        turn=turn,
-        shift=shift,
-        far=read.laid.far,
-    )
-
-
-def _landmark(level: str, vertices: FloatArray) -> float:
-    return float(value_at(near_level(level), vertices[:, 1]))
-
-
-def common_body_of_mannequin(mannequin: Mannequin, *, name: str) -> CommonBody:
-    """Return the body of a mannequin of a size or of measurements; head, hands and feet, which it lacks, are the model's."""
-    triangles = triangulate(np.asarray(mannequin.layout.faces))[0].astype(np.int64)
-    # Without head and feet the model would slide up or down.
-    levels = mannequin.levels()
-    fit = fit_body(mannequin.vertices, triangles, {name: levels[name].height for name in _LEVELS})
-    mesh = Mesh(mannequin.vertices, triangles)
-    vertices, _ = lay_on_scan(finer_body()[0] @ BodyModel.load().vertices(fit.person), mesh)
-    # Laid on the mannequin its levels are some millimetres off: they go where the mannequin has them, and what lies between follows.
-    places, heights = model_places(), vertices[:, 1]
-    for _ in range(_MOVES):
-        arms = places.strips["arm left"] | places.strips["arm right"]
-        own = np.array(
-            [
-                np.mean([value_at(near_level(name, side), vertices[:, 1]) for side in ("left", "right")])
-                for name in _LEVELS
-            ]
-        )
-        move = np.interp(heights, own, [levels[name].height for name in _LEVELS] - own)
-        vertices = vertices + np.outer(np.where(arms, 0.0, move), [0.0, 1.0, 0.0])
-        vertices, _ = lay_on_scan(vertices, mesh)
-        heights = vertices[:, 1]
-    # So would the ends of its shoulders and its underarms: a table may have both where no body of that girth has them.
-    for _ in range(_MOVES):
-        vertices, _ = lay_on_scan(vertices + _towards_armholes(vertices, mannequin), mesh)
-    far = float(fit.distance[np.isfinite(fit.distance)].mean())
-    return CommonBody(name=name, person=fit.person, vertices=vertices, far=far)
 
 
 def _towards_armholes(vertices: FloatArray, mannequin: Mannequin) -> FloatArray:
@@ -166,18 +179,3 @@ def _towards_armholes(vertices: FloatArray, mannequin: Mannequin) -> FloatArray:
         follows[sign * vertices[:, 0] <= 0.0] = 0.0
         move += follows[:, None] * (at_low + np.clip(height, 0.0, 1.0)[:, None] * (at_top - at_low))
     return move
-
-
-def common_body_inside(vertices: FloatArray, triangles: NDArray[np.int64], *, name: str) -> CommonBody:
-    """Return the body that may wear a garment (#V by 3 [m], Y up, front +Z; #T by 3, outward)."""
-    fit = fit_inside(vertices, triangles)
-    model, finer = BodyModel.load(), finer_body()[0]
-    return CommonBody(name=name, person=fit.person, vertices=finer @ model.vertices(fit.person))
-
-
-@lru_cache(maxsize=1)
-def skin_triangles() -> NDArray[np.int64]:
-    """Return the triangles of the common mesh that cloth lies over: without head, hands and feet."""
-    finer, triangles = finer_body()
-    plain = finer @ BodyModel.load().detail.astype(float) < 0.5
-    return triangles[plain[triangles].all(axis=1)]

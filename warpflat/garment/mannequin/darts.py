@@ -11,7 +11,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest
 from warpflat.garment.mannequin.halves import is_side
-from warpflat.garment.mannequin.layout import Layout
+from warpflat.garment.mannequin.layout import Layout, joined_runs
 
 __all__ = [
     "FormDart",
@@ -243,18 +243,8 @@ def _grid_line(layout: Layout, dart: FormDart) -> list[int]:
 
 
 def _longest_run(line: Sequence[int], cloth: _Cloth) -> list[int]:
-    """Return the longest stretch of a line inside a piece; those of a closed line join over its first vertex."""
-    runs: list[list[int]] = []
-    for a, b in itertools.pairwise(line):
-        if (a, b) not in cloth.inner:
-            continue
-        if runs and runs[-1][-1] == a:
-            runs[-1].append(b)
-        else:
-            runs.append([a, b])
-    if len(runs) > 1 and line[0] == line[-1] and runs[-1][-1] == runs[0][0]:
-        runs[0] = [*runs.pop(), *runs[0][1:]]
-    return max(runs, key=len, default=[])
+    """Return the longest stretch of a line inside a piece."""
+    return max(joined_runs(edge for edge in itertools.pairwise(line) if edge in cloth.inner), key=len, default=[])
 
 
 def _part_of(vertices: FloatArray, run: list[int], dart: FormDart) -> list[int]:

@@ -15,7 +15,7 @@ _RANGE = -30.0, 400.0
 
 
 def _preset(bust: float, underbust: float, waist: float, hip: float, biceps: float) -> dict[str, float]:
-    """Return the ease of all levels; the abdomen has the hip's, as what hangs from there, and the forearm the biceps'."""
+    """Return the ease of all levels; the abdomen has the hip's, as what hangs from there, and the elbow the biceps'."""
     trunk = {
         "bust": bust,
         "underbust": underbust,

@@ -13,7 +13,7 @@ body to centre back, close to a loop, from which each leg runs down to its ankle
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from warpflat.core import InputError, IntArray, short_repr
 from warpflat.flat import half_edges
 
-__all__ = ["ARM_LEVELS", "LEG_LEVELS", "LEG_LINES", "QUARTERS", "RING_LEVELS", "Layout", "make_layout"]
+__all__ = ["ARM_LEVELS", "LEG_LEVELS", "LEG_LINES", "QUARTERS", "RING_LEVELS", "Layout", "joined_runs", "make_layout"]
 
 
 #: Closed horizontal levels, bottom up.
@@ -264,6 +264,19 @@ def _strips(resolution: float) -> Strips:
         yokes=yokes, neck=neck, arms=arms, arm_row=arm_row, crotch=crotch, crotch_point=to_point, legs=legs,
         leg_row=leg_row, vertex_count=next(counter),
     )  # fmt: skip
+
+
+def joined_runs(edges: Iterable[tuple[int, int]]) -> list[list[int]]:
+    """Return the vertices of each run of edges that follow each other; the last run of a closed line is joined to its first."""
+    runs: list[list[int]] = []
+    for a, b in edges:
+        if runs and runs[-1][-1] == a:
+            runs[-1].append(b)
+        else:
+            runs.append([a, b])
+    if len(runs) > 1 and runs[-1][-1] == runs[0][0]:
+        runs[0] = [*runs.pop(), *runs[0][1:]]
+    return runs
 
 
 def _bricks(strips: Strips) -> dict[str, IntArray]:

@@ -17,15 +17,14 @@ from warpflat.pattern import (
     SIDES,
     SKIN,
     DrawnView,
+    Facets,
     Pen,
     Scale,
     View,
     draw_row,
     drawn_page,
-    make_facets,
     row_size,
     space_out,
-    views_around,
     write_maps,
 )
 
@@ -46,8 +45,8 @@ _SCALE = 15.0
 
 def body_views(mannequin: Mannequin, sides: Iterable[tuple[str, float]]) -> dict[str, View]:
     """Return views of a mannequin without its mesh by title, from some sides [degrees]."""
-    facets = make_facets(mannequin.layout.body_faces, np.empty((0, 2), dtype=np.int32))
-    return views_around(mannequin.vertices, facets, sides)
+    facets = Facets.of(mannequin.layout.body_faces, np.empty((0, 2), dtype=np.int32))
+    return View.around(mannequin.vertices, facets, sides)
 
 
 def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) -> None:

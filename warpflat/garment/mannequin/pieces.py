@@ -14,7 +14,7 @@ from warpflat.core import FloatArray, InputError, IntArray, find_unused_name, ne
 from warpflat.flat import Surface, border_edges, euler_characteristic, half_edges, join_labels
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.halves import check_halves, fold_among, is_side, lies_on_both
-from warpflat.garment.mannequin.layout import Layout
+from warpflat.garment.mannequin.layout import Layout, joined_runs
 
 __all__ = ["FormPiece", "cut_pieces", "is_part_of"]
 
@@ -356,17 +356,7 @@ def _inner_runs(layout: Layout, corners: IntArray, grid_vertices: IntArray) -> d
         inner[a, b], inner[b, a] = v, u
     found: dict[str, list[list[int]]] = {}
     for line, ids in layout.lines.items():
-        runs: list[list[int]] = []
-        for a, b in itertools.pairwise(ids.tolist()):
-            if (a, b) not in inner:
-                continue
-            u, v = inner[b, a], inner[a, b]
-            if runs and runs[-1][-1] == u:
-                runs[-1].append(v)
-            else:
-                runs.append([u, v])
-        if len(runs) > 1 and runs[0][0] == runs[-1][-1]:
-            runs[0] = [*runs.pop(), *runs[0][1:]]
-        if runs:
+        edges = itertools.pairwise(ids.tolist())
+        if runs := joined_runs((inner[b, a], inner[a, b]) for a, b in edges if (a, b) in inner):
             found[line] = runs
     return found

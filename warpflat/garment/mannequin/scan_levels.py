@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpflat.core import FloatArray, InputError
-from warpflat.garment.mannequin.body_landmarks import near_level, value_at
+from warpflat.garment.mannequin.body_landmarks import height_of, near_level
 from warpflat.garment.mannequin.scan_pose import LEVELS_UP
 from warpflat.garment.mannequin.scan_sections import OUTLINES, BodySections, smooth
 from warpflat.garment.mannequin.slicer import UP
@@ -102,10 +102,6 @@ def find_levels(
     return found
 
 
-def _landmark(body: BodySections, name: str, side: str = "left") -> float:
-    return float(value_at(near_level(name, side), body.vertices[:, 1]))
-
-
 def _least(
     body: BodySections,
     name: str,
@@ -118,7 +114,7 @@ def _least(
     below: float = np.inf,
 ) -> ScanLevel:
     """Return where values at some heights are least near a landmark, and below a height; the landmark if they are so nowhere within."""
-    at = _landmark(body, name, side)
+    at = height_of(name, body.vertices, side)
     rows = np.flatnonzero((np.abs(y - at) < _REACH[name] * body.stature) & (y < below))
     row = int(rows[np.argmin(values[rows])]) if len(rows) else 0
     if len(rows) < 3 or not rows[0] < row < rows[-1]:
@@ -145,7 +141,7 @@ def _trunk_levels(body: BodySections, noise: float, given: Mapping[str, float]) 
     lacking = "the trunk has no narrowest section below the underbust"
     found["waist"] = _least(body, "waist", t.y, smooth(t.girth, sigma), noise, lacking, below=below)
     # Bust points are the bust's most prominent places.
-    bust = _landmark(body, "bust")
+    bust = height_of("bust", body.vertices)
     points = _BUST_POINTS * float(np.interp(bust, t.y, t.girth)) / size
     ahead = smooth(np.array([np.interp(points, OUTLINES, row).max() for row in t.outlines]), sigma)
     shown = _least(body, "bust", t.y, -ahead, noise, "no bust stands out", below=armpit - _BELOW_ARMPIT * size)
@@ -159,7 +155,7 @@ def _trunk_levels(body: BodySections, noise: float, given: Mapping[str, float]) 
     between = (t.y > hip + 0.38 * (waist - hip)) & (t.y < hip + 0.62 * (waist - hip))
     belly = float(t.y[between][np.argmax(smooth(t.front, 3)[between])]) if between.any() else 0.5 * (waist + hip)
     found["abdomen"] = ScanLevel(height=belly)
-    low = _landmark(body, "front_neck")
+    low = height_of("front_neck", body.vertices)
     beside = float(np.clip(_side_neck(body, armpit), low + 0.008 * size, low + 0.035 * size))
     found["front_neck"], found["side_neck"] = ScanLevel(height=low), ScanLevel(height=beside)
     return found
@@ -174,8 +170,8 @@ def _underbust(body: BodySections, noise: float, armpit: float) -> ScanLevel:
         armpit: height [m].
     """
     t, size = body.trunk, body.stature
-    at = min(_landmark(body, "underbust"), armpit - 0.02 * size)
-    apart = _BUST_POINT * float(np.interp(_landmark(body, "bust"), t.y, t.girth)) / size
+    at = min(height_of("underbust", body.vertices), armpit - 0.02 * size)
+    apart = _BUST_POINT * float(np.interp(height_of("bust", body.vertices), t.y, t.girth)) / size
     outline = smooth(np.array([np.interp(apart, OUTLINES, row) for row in t.outlines]), 2.0)
     bend = np.gradient(np.gradient(outline, t.y), t.y) * size
     below = np.flatnonzero((t.y > at - _FOLD_BELOW * size) & (t.y < at))
@@ -193,7 +189,7 @@ def _underbust(body: BodySections, noise: float, armpit: float) -> ScanLevel:
 
 def _side_neck(body: BodySections, armpit: float) -> float:
     """Return the height [m] at which the outline turns from the shoulder into the neck: furthest inside the line between the two."""
-    t, size, at = body.trunk, body.stature, _landmark(body, "side_neck")
+    t, size, at = body.trunk, body.stature, height_of("side_neck", body.vertices)
     upper = np.flatnonzero((t.y > 0.80 * size) & (t.y < 0.91 * size))
     narrow = float(t.y[upper[np.argmin(t.girth[upper])]])
     y = t.y[(t.y >= armpit + 0.55 * (narrow - armpit)) & (t.y <= narrow)]
@@ -212,7 +208,7 @@ def _leg_level(body: BodySections, name: str, side: str, noise: float) -> ScanLe
         return _least(body, name, y, -girth if name == "calf" else girth, noise, "the legs do not show it", side=side)
     # Fat moves the skin over a knee: its crease behind, furthest inside the line from calf to thigh, then lies elsewhere.
     back = smooth(np.array([hull[:, 1].min() for hull in body.legs.hulls[side]]), 3.0)
-    ends, at = [_landmark(body, "calf", side), 0.86 * body.crotch], _landmark(body, "knee", side)
+    ends, at = [height_of("calf", body.vertices, side), 0.86 * body.crotch], height_of("knee", body.vertices, side)
     inside = back - np.interp(y, ends, np.interp(ends, y, back))
     crease = summit(y, inside, int(np.argmax(np.where(np.abs(y - at) < _CREASE * size, inside, -np.inf))))
     if abs(crease - at) > _KNEE_SURE * size:

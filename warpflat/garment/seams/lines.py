@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, FloatArray, reflected, unit
+from warpflat.core import FloatArray, reflected, unit
 from warpflat.flat import LEAST_MOUTH, TRIED, LaidCloth, border_loops, components
 from warpflat.garment.seams.anatomy import END, FROM_SHOULDERS, Anatomy, has_role
 from warpflat.garment.seams.by_hand import level_of
@@ -173,8 +173,11 @@ def _darts(
     """Yield darts to the bulges and misfits of a piece, with the rows of its vertices that each cuts."""
     surface, flat, size = piece.surface, laid.positions, anatomy.size
     own, loop = piece.mesh.vertex_of, border_loops(surface.faces)[0].astype(np.int64)
-    # A dart begins at no hem, and at no other dart.
-    starts = loop[~_at_hem(cloth, own[loop], anatomy) & (np.bincount(own)[own[loop]] == 1)]
+    # A dart begins at no free end below, for what hangs is shaped from above, nor at the lower end of an opening, nor at another dart.
+    heights, hangs = cloth.vertices @ anatomy.up, has_role(cloth, own[loop], "hem", "sleeve", "leg")
+    low = heights[own[loop]] < heights.min() + END * np.ptp(heights)
+    hangs |= low & has_role(cloth, own[loop], "opening")
+    starts = loop[~hangs & (np.bincount(own)[own[loop]] == 1)]
     inner = np.flatnonzero(~laid.border)
     facing = piece.mesh.area_vectors
     across = anatomy.across(surface.vertices)
@@ -328,14 +331,3 @@ def _tailored(
         for value in (float(own[place]), float(np.median(half))):
             if low < value < high and (field == FACING or not whole or abs(across[place]) > 0.04 * size):
                 yield Line(name=name, normal=anatomy.normal, point=surface.vertices[place], level=(field, value))
-
-
-def _at_hem(cloth: Cloth, vertices: Ids, anatomy: Anatomy) -> BoolArray:
-    """Return which vertices are at a free end below: a hem, the end of a sleeve or a leg, the lower end of an opening in front.
-
-    No dart begins there: what hangs is shaped from above.
-    """
-    heights = cloth.vertices @ anatomy.up
-    low = heights[vertices] < heights.min() + END * np.ptp(heights)
-    ends = has_role(cloth, vertices, "hem", "sleeve", "leg")
-    return np.asarray(ends | (low & has_role(cloth, vertices, "opening")))

@@ -17,7 +17,7 @@ from warpflat.pattern.drafting.drafted_darts import fisheye_legs
 from warpflat.pattern.drafting.label import TAILS, Label, Words, text_width
 from warpflat.pattern.drafting.measures import name_in_units
 from warpflat.pattern.drafting.piece_parts import HEMMED_LEVELS, LEFT_OUT
-from warpflat.pattern.drafting.placement import LabelRoom, Spot, spots_along
+from warpflat.pattern.drafting.placement import LabelRoom, Spot, as_read, spots_along
 from warpflat.pattern.drafting.polygons import parallelogram
 from warpflat.pattern.drafting.words import as_sentence, translate, translate_name
 
@@ -112,9 +112,9 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
 
     middle = pieces[len(pieces) // 2]
     longest = max(pieces, key=lambda piece: sum(edge.length for edge in piece.fold_edges))
-    edge, joints = _widest_edge(pieces), () if paper is None else paper.joints
+    edge, joints = _widest_edge(pieces), shapely.MultiLineString([] if paper is None else list(paper.joints))
     sizes = ", ".join(piece.size for piece in pieces)
-    drawings = []
+    drawings = list[Drawing]()
     for index, piece in enumerate(pieces):
         # Dashes of several sizes upon each other would be a full line.
         strokes = [
@@ -136,7 +136,11 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
             written = _Annotations(piece, label, rows, paper, borders=False, slits=slits)
             strokes, words = strokes + written.strokes, written.words
         if edge:
-            words += _size_tags(piece, edge, (index + 0.5) / len(pieces), joints)
+            lines = [shapely.LinearRing(other.cut_line) for other in pieces if other is not piece]
+            details = [stroke for other in pieces for stroke in _detail_strokes(other)]
+            lines += [shapely.LineString(stroke.points) for stroke in details if stroke.role == "notch"]
+            boxes = [shapely.Polygon(row.box()) for drawing in drawings for row in drawing.words if row.tag]
+            words += _size_tags(piece, edge, (index + 0.5) / len(pieces), shapely.union_all([*lines, *boxes]), joints)
         drawings.append(Drawing(piece=piece, strokes=tuple(strokes), words=tuple(words)))
     return tuple(drawings)
 
@@ -155,24 +159,32 @@ def _widest_edge(pieces: Sequence[DraftedPiece]) -> str:
     return max(shared, key=lambda name: shift_across(name) * pieces[0].edge(name).length ** 0.5, default="")
 
 
-def _size_tags(piece: DraftedPiece, name: str, share: float, joints: Sequence[FloatArray]) -> list[Words]:
-    """Return the size of a piece on its own cut line beside an edge, twice if that is long; sizes are staggered by their share."""
+def _size_tags(piece: DraftedPiece, name: str, share: float, avoided: Geometry, joints: Geometry) -> list[Words]:
+    """Return the size of a piece on its own cut line and along it, beside an edge, twice if that is long.
+
+    Args:
+        piece: in this size.
+        name: of the edge.
+        share: by which sizes are staggered.
+        avoided: lines of other sizes, notches and words, where there is room beside them.
+        joints: of sheets, at which words are cut.
+    """
     import shapely
 
-    ring, sheets, tags = shapely.LinearRing(piece.cut_line), shapely.MultiLineString(list(joints)), list[Words]()
+    ring, tags = shapely.LinearRing(piece.cut_line), list[Words]()
     line = piece.edge(name).line
     for start, along in ((0.08, 0.3), (0.62, 0.3)) if polyline_length(line) > SHORT_EDGE else ((0.05, 0.9),):
-        tried = []
-        # A little to either side, more and more, where a joint of two sheets would cut it.
+        tried = list[tuple[bool, bool, int, Words]]()
+        # A little to either side, more and more.
         for away in (0.0, *(sign * step * 0.02 for step in range(1, 16) for sign in (1, -1))):
-            at = resample(line, min(max(start + along * share + away, 0.0), 1.0))
+            middle = min(max(start + along * share + away, 0.0), 1.0)
+            before, at, after = resample(line, [max(middle - 0.01, 0.0), middle, min(middle + 0.01, 1.0)])
+            x, y = as_read(unit(after - before))
             on_cut = np.asarray(ring.interpolate(ring.project(shapely.Point(at))).coords[0])
-            tried.append(Words(text=piece.size, at=on_cut, height=0.004, bold=True, tag=True))
-            if shapely.disjoint(shapely.Polygon(tried[-1].box()), sheets):
-                break
-        else:
-            tried = tried[:1]
-        tags.append(tried[-1])
+            words = Words(text=piece.size, at=on_cut, height=0.004, angle=float(np.arctan2(y, x)), bold=True, tag=True)
+            box = shapely.Polygon(words.box())
+            tried.append((bool(box.intersects(joints)), bool(box.intersects(avoided)), len(tried), words))
+        tags.append(min(tried, key=lambda each: each[:3])[3])
     return tags
 
 

@@ -239,7 +239,10 @@ def _fair(points: FloatArray, places: FloatArray, smooth: FloatArray) -> FairLin
     angles = _directions(even)
     apart = min(max(1, round(WITHIN / evenly[1])), len(angles) - 1)
     turn = float(np.abs(angles[apart:] - angles[:-apart]).max())
-    return FairLine(points=placed, shift=_distance(points, smooth), inflections=count_inflections(smooth), turn=turn)
+    # The line goes on straight beyond its ends.
+    away = 0.02 * unit(np.stack([smooth[0] - smooth[1], smooth[-1] - smooth[-2]]))
+    shift = farthest(np.vstack([smooth[0] + away[0], smooth, smooth[-1] + away[1]]), points)
+    return FairLine(points=placed, shift=shift, inflections=count_inflections(smooth), turn=turn)
 
 
 def _straight_places(points: FloatArray, places: FloatArray, straight: BoolArray | None) -> BoolArray:
@@ -263,9 +266,3 @@ def _evenly(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     arc = arc_lengths(points)
     places = np.linspace(0.0, arc[-1], int(np.clip(np.ceil(arc[-1] / STEP), FEWEST, MOST)))
     return places, points_at_lengths(points, places)
-
-
-def _distance(points: FloatArray, line: FloatArray) -> float:
-    """Return the largest distance of a point from a line that goes on straight beyond its ends [m]."""
-    away = 0.02 * unit(np.stack([line[0] - line[1], line[-1] - line[-2]]))
-    return farthest(np.vstack([line[0] + away[0], line, line[-1] + away[1]]), points)

@@ -15,19 +15,19 @@ Units = Literal["mm", "cm", "in"]
 UNITS = get_args(Units)
 INCH = 0.0254
 YARD = 0.9144
-#: A length is written as a fraction of an inch if that is as near as this [m].
+#: A length is written as sixteenths of an inch if they are as near as this [m], or as a fiftieth of it: an allowance is not rounded.
 FRACTION = 0.0002
 
 
 def length_words(length: float, units: str = "cm") -> str:
-    """Return a length [m] in words: "10 mm", "1 cm", "35.5 cm", "3/8 in", "13.98 in"."""
+    """Return a length [m] in words: "10 mm", "1 cm", "35.5 cm", "3/8 in", "0.39 in", "13 15/16 in"."""
     if units == "mm":
         return _number(f"{round(1000 * length, 1):g}") + " mm"
     if units == "cm":
         # Allowances are given to half a millimetre.
         return _number(f"{round(100 * length, 2 if length < 0.1 else 1):g}") + " cm"
     whole, sixteenths = divmod(round(length / INCH * 16), 16)
-    if abs((whole + sixteenths / 16) * INCH - length) > FRACTION:
+    if abs((whole + sixteenths / 16) * INCH - length) > max(FRACTION, 0.02 * length):
         return _number(f"{length / INCH:.2f}") + " in"
     return f"{_with_fraction(whole, sixteenths, 16)} in"
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = [
     "LabelRoom",
     "Spot",
+    "as_read",
     "default_grain",
     "fit_label",
     "in_batches",
@@ -229,6 +230,11 @@ def space_out(wanted: Sequence[float], distance: float, low: float, high: float)
     return [min(place, high - distance * i) for i, place in enumerate(places)]
 
 
+def as_read(along: FloatArray) -> FloatArray:
+    """Return the direction of a line (2), or the opposite one, in which words along it are read: to the right, or upwards."""
+    return -along if along[0] < -_STEEP or (abs(along[0]) <= _STEEP and along[1] < 0) else along
+
+
 def spots_along(
     line: FloatArray,
     width: float,
@@ -254,8 +260,8 @@ def spots_along(
         stretch = points_at_lengths(line, centre + np.linspace(-0.5, 0.5, 9) * width)
         before, after = stretch[[0, -1]]
         along = unit(after - before)
-        backwards = along[0] < -_STEEP or (abs(along[0]) <= _STEEP and along[1] < 0)
-        along = -along if backwards else along
+        backwards = as_read(along) is not along
+        along = as_read(along)
         above = np.array([-along[1], along[0]])
         bend = (stretch - before) @ above
         offsets = {"above": float(bend.max()) + clearance, "below": float(bend.min()) - clearance}

@@ -18,6 +18,7 @@ import numpy as np
 
 from warpflat.core import other_side, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment
+from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.pieces import Seam, SeamOpening, SeamSide
 from warpflat.pattern.drafting.polygons import turn_between
 from warpflat.pattern.drafting.seam_words import joint_words
@@ -136,7 +137,9 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
         free = {piece for task in tasks if task.technique == "facing" for piece, _ in task.sewn} - workshop.lined
         faced = any(workshop.pieces[piece].role == "facing" for piece in free)
         neaten = translate("Neaten the inner edges of the facings.") if faced else ""
-        values: dict[str, Any] = {"below": "", "where": "", "neaten": neaten}
+        # Lengths of the techniques themselves, by their millimetres.
+        lengths = {f"mm{mm}": length_words(1e-3 * mm, workshop.units) for mm in (5, 10, 30, 35)}
+        values: dict[str, Any] = {"below": "", "where": "", "neaten": neaten, **lengths}
         for task in tasks:
             values |= task.values
         values |= {

@@ -120,7 +120,9 @@ class SewingTasks:
         if len(group) > 1 or (other != seam.name and other in {each.name for each in self.seams}):
             return False
         joined = [self.pieces[side.piece] for side in seam.stretches]
-        within = not any(side.mirrored or side.copy for side in seam.stretches)
+        # A copy that is turned over is of another pair, unless both sides are one piece's: then it is sewn across the centre.
+        across = any(side.mirrored for side in seam.stretches) and len({piece.name for piece in joined}) == 1
+        within = not across and not any(side.copy for side in seam.stretches)
         if within and all(piece.quantity == 2 and not piece.on_fold for piece in joined):
             return True
         return other != seam.name and all(piece.on_fold or piece.is_pair for piece in joined)
@@ -490,10 +492,8 @@ def _mirror_groups(seams: Sequence[Seam]) -> list[list[Seam]]:
             alike |= dict.fromkeys(own, key)
             groups.setdefault(key, []).append(seam)
             continue
-        sides = sorted(
-            tuple(sorted((without_side(s.piece), without_side(s.edge)) for s in side)) for side in seam.sides
-        )
-        # A zip in one side alone makes it another seam than the other side.
+        sides = sorted(tuple(sorted((without_side(s.piece), line_name(s.edge)) for s in side)) for side in seam.sides)
+        # A zip in one side alone makes it another seam than the other side. Parts of an edge are numbered around the piece.
         groups.setdefault((without_side(seam.name), tuple(sides), seam.openings), []).append(seam)
     return list(groups.values())
 

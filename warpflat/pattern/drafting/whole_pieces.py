@@ -61,7 +61,8 @@ def whole_pieces(
             title = _copy_name(side)
             whole[title] = replace(given[side.piece], name=title, placement=None)
             drawn[title] = side.piece
-    over = {_copy_name(side) for side in sides if side.mirrored} | {name for name in twice if name in sewn}
+    # The other side of a half is unfolded already.
+    over = {_copy_name(side) for side in sides if side.mirrored and side.piece not in halves} | (twice & sewn)
     for piece in [whole[name] for name in whole if name in over]:
         whole[piece.name + MIRRORED] = replace(turn_over(piece), name=piece.name + MIRRORED)
         drawn[piece.name + MIRRORED] = drawn[piece.name]

@@ -14,7 +14,7 @@ from warpflat.flat import MAPS, WornFit, border_edges, remedy_words
 from warpflat.pattern.export.colours import LEAST_PRESSURE, Scale
 from warpflat.pattern.export.figure import drawn_page
 from warpflat.pattern.export.letters import is_drawn, titles
-from warpflat.pattern.export.views import DrawnView, make_facets, pattern_view
+from warpflat.pattern.export.views import DrawnView, Facets, View
 from warpflat.pattern.export.wear_words import RANGES, limit_words, pressure_words, strain_words
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def write_wear_sheet(
                     pen.write(0.15, top - 0.37, words, 9, va="top", linespacing=1.35, color=colour)
                 lines = [np.column_stack([line[:-1], line[1:]]) for line in result.network.surface.lines.values()]
                 beyond = [border_edges(result.faces[misfit.faces]) for misfit in result.fit.misfits]
-                view = pattern_view(result.positions, make_facets(result.faces, border_edges(result.faces)), {})
+                view = View.of_pattern(result.positions, Facets.of(result.faces, border_edges(result.faces)), {})
                 drawn = DrawnView(pen, view, left=0.0, bottom=0.0, inches_per_metre=inches)
                 wide, high = (inches * view.size[:2]).tolist()
                 for number, (key, scale) in enumerate(maps):

@@ -13,7 +13,7 @@ from warpflat.flat import join_surfaces
 from warpflat.pattern.export.colours import Scale, energy_scale
 from warpflat.pattern.export.figure import GREY, INK, PAGE_WIDTH, drawn_page
 from warpflat.pattern.export.geometry import polylines_of
-from warpflat.pattern.export.views import SIDES, draw_row, make_facets, row_size, surface_view, views_around
+from warpflat.pattern.export.views import SIDES, Facets, View, draw_row, row_size
 
 if TYPE_CHECKING:
     from warpflat.flat import Ledger, LedgerEntry
@@ -50,10 +50,10 @@ def write_ledger_picture(path: str | os.PathLike[str], ledger: Ledger) -> None:
     entries = ledger.entries[:_MOST]
     surface = join_surfaces([piece.surface for piece in ledger.pieces])
     density = np.concatenate([piece.face_energy_density for piece in ledger.pieces])
-    facets = make_facets(surface.faces)
-    views = {"": surface_view(surface, facets, polylines_of({}))}
+    facets = Facets.of(surface.faces)
+    views = {"": View.of_surface(surface, facets, polylines_of({}))}
     if len(ledger.pieces) > 1:  # around a body
-        views = views_around(surface.vertices, facets, (SIDES[0], SIDES[-1]))
+        views = View.around(surface.vertices, facets, (SIDES[0], SIDES[-1]))
     wide, high = row_size(views)
     per_metre = min((_BODY - _GAP * (len(views) - 1)) / wide, 5.2 / high)
     height = max(high * per_metre + 0.7, _ROW * (len(entries) + 2)) + 1.15

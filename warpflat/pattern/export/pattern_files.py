@@ -70,7 +70,7 @@ class PatternOptions:
     Attributes:
         formats: some of "dxf", "svg", "pdf", "json", "garmentcode" and "plt".
         dialect: of the DXF, "aama" or "astm".
-        paper: of the PDF, "A4", "Letter" or "A0".
+        paper: of the PDF, "A4", "Letter", "A0" or "Projector".
         tolerance: how far [m] a drawn curve may lie from the mesh's border; None takes 0.1 mm, and more only where the
             border is so ragged that its curves would be all wiggles, as on scans.
         rules: kinds and allowances of edges.
@@ -156,9 +156,7 @@ def export_patterns(
         InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", an allowance of a pattern that
             has its own, or the folder cannot be written.
     """
-    for format in formats:
-        if format not in FORMATS:
-            raise InputError(f"unknown format {format!r}; {nearest(format, FORMATS)}")
+    _check_formats(formats)
     if "json" in formats and sizes is not None:
         raise InputError(
             "pattern.json holds all sizes, since the other formats are made from it: leave out the size, or take dxf, svg or pdf"
@@ -247,6 +245,12 @@ def _rewritten(
                 record_file(folder, name, written)
 
 
+def _check_formats(formats: Iterable[str]) -> None:
+    for format in formats:
+        if format not in FORMATS:
+            raise InputError(f"unknown format {format!r}; {nearest(format, FORMATS)}")
+
+
 def write_pattern(
     make: Callable[[], tuple[Pattern, tuple[str, ...]]], to: str | Path, *, name: str, options: PatternOptions
 ) -> WrittenPattern:
@@ -262,7 +266,7 @@ def write_pattern(
         options: formats, rules and cloth.
 
     Raises:
-        InputError: the folder cannot be written.
+        InputError: an unknown format, or the folder cannot be written.
     """
     from warpflat.pattern.drafting.curves import TOLERANCE
     from warpflat.pattern.drafting.cut_list import cut_list
@@ -271,6 +275,7 @@ def write_pattern(
     from warpflat.pattern.drafting.walked import walk_seams
     from warpflat.pattern.export.pdf import too_many_sheets
 
+    _check_formats(options.formats)
     if not options.formats and options.cloth is None:
         return WrittenPattern()
     report_activity("drafting the pattern")

@@ -22,17 +22,7 @@ from warpflat.pattern.export.geometry import face_areas, polylines_of
 from warpflat.pattern.export.labels import draw_lines
 from warpflat.pattern.export.letters import all_letters, is_drawn, titles
 from warpflat.pattern.export.packing import pack_boxes, pack_rows
-from warpflat.pattern.export.views import (
-    SIDES,
-    DrawnView,
-    View,
-    draw_row,
-    make_facets,
-    pattern_view,
-    row_size,
-    surface_view,
-    views_around,
-)
+from warpflat.pattern.export.views import SIDES, DrawnView, Facets, View, draw_row, row_size
 
 __all__ = ["DraftedOutline", "PicturePiece", "draw_figure", "write_picture"]
 
@@ -292,13 +282,13 @@ class _Cell:
 def _cell(piece: PicturePiece, title: str, scale: Scale, *, shows_body: bool) -> _Cell:
     """Return the cell of a piece, with its views."""
     faces = np.asarray(piece.faces, dtype=np.int32)
-    in_plane, views = make_facets(faces), dict[str, View]()
+    in_plane, views = Facets.of(faces), dict[str, View]()
     if shows_body:
         in_space = piece.surface.lines if piece.surface_lines is None else piece.surface_lines
-        on_body = in_plane if np.array_equal(faces, piece.surface.faces) else make_facets(piece.surface.faces)
-        views["on the body"] = surface_view(piece.surface, on_body, polylines_of(in_space))
+        on_body = in_plane if np.array_equal(faces, piece.surface.faces) else Facets.of(piece.surface.faces)
+        views["on the body"] = View.of_surface(piece.surface, on_body, polylines_of(in_space))
     positions = np.asarray(piece.positions, dtype=np.float64)
-    views["pattern" if shows_body else ""] = pattern_view(positions, in_plane, polylines_of(piece.lines))
+    views["pattern" if shows_body else ""] = View.of_pattern(positions, in_plane, polylines_of(piece.lines))
     colours = scale.rgb(np.asarray(piece.face_energy_density, dtype=np.float64))
     cell = _Cell(
         name=title, captions=dict(piece.captions), colours=colours, views=views,
@@ -318,7 +308,7 @@ class _Band:
         flattened, others = [piece.surface for piece in pieces], [surface for each in drafted for surface in each.worn]
         worn = join_surfaces([*flattened, *others])
         points, facets, skin = dress(body, worn.vertices, worn.faces)
-        self._views = views_around(points, facets)
+        self._views = View.around(points, facets)
         for view in self._views.values():
             cloth = view.points[: len(worn.vertices), 2]
             cloth += _NEARER

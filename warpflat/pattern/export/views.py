@@ -26,16 +26,11 @@ __all__ = [
     "Shot",
     "View",
     "draw_row",
-    "make_facets",
-    "pattern_view",
     "row_size",
-    "surface_view",
-    "view_from_side",
-    "views_around",
     "write_maps",
 ]
 
-#: From where a worn garment or a body is shown, with degrees for :func:`view_from_side`.
+#: From where a worn garment or a body is shown, with degrees for :meth:`View.from_side`.
 SIDES = (("front", 0.0), ("left side", 90.0), ("back", 180.0))
 
 _FINE = 500_000  # triangles, about as many as pixels
@@ -62,21 +57,21 @@ class Facets:
     outline: IntArray
     used: NDArray[np.int64]
 
+    @classmethod
+    def of(cls, faces: IntArray, outline: IntArray | None = None) -> Facets:
+        """Return the facets of faces (#F by 4).
 
-def make_facets(faces: IntArray, outline: IntArray | None = None) -> Facets:
-    """Return the facets of faces (#F by 4).
-
-    Args:
-        faces: those that are coloured.
-        outline: #B by 2, edges that are drawn in place of the border; the edges of a coarse mesh are not drawn then.
-    """
-    triangles, face = triangulate(faces)
-    has_face = np.zeros(int(faces.max(initial=-1)) + 1, dtype=bool)
-    has_face[triangles] = True
-    used = np.flatnonzero(has_face)
-    drawn = faces if outline is None else faces[:0]
-    outline = outline_edges(faces) if outline is None else outline
-    return Facets(faces=drawn, triangles=triangles, face_of_triangle=face, outline=outline, used=used)
+        Args:
+            faces: those that are coloured.
+            outline: #B by 2, edges that are drawn in place of the border; the edges of a coarse mesh are not drawn then.
+        """
+        triangles, face = triangulate(faces)
+        has_face = np.zeros(int(faces.max(initial=-1)) + 1, dtype=bool)
+        has_face[triangles] = True
+        used = np.flatnonzero(has_face)
+        drawn = faces if outline is None else faces[:0]
+        outline = outline_edges(faces) if outline is None else outline
+        return cls(faces=drawn, triangles=triangles, face_of_triangle=face, outline=outline, used=used)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -98,6 +93,56 @@ class View:
     vectors: FloatArray | None
     directions: FloatArray = field(default_factory=lambda: np.eye(3))
 
+    @classmethod
+    def of_surface(cls, surface: Surface, facets: Facets, lines: Mapping[str, list[IntArray]]) -> View:
+        """Return a surface seen from its front: along its mean normal, a little from the side and from above, Y upwards.
+
+        A surface that faces all directions (a skirt) is seen from +Z, one that lies flat on the ground from above.
+        """
+        vectors = area_vectors(surface.vertices, facets.triangles)
+        total, mean = float(np.linalg.norm(vectors, axis=1).sum()), vectors.sum(axis=0)
+        length = float(np.linalg.norm(mean))
+        front = mean / length if length > 0.12 * total and length > 0.0 else np.array([0.0, 0.0, 1.0])
+        aside, above = np.radians(22.0), np.radians(12.0)
+        if abs(front[1]) > 0.85:
+            towards = np.array([np.sin(aside), np.copysign(2.0, front[1]), np.copysign(1.0, front[1])])
+            upwards = np.array([0.0, 0.0, -np.copysign(1.0, front[1])])
+        else:
+            azimuth = np.arctan2(front[0], front[2]) + aside
+            elevation = np.clip(np.arcsin(np.clip(front[1], -1.0, 1.0)) + above, -1.2, 1.2)
+            level = np.cos(elevation)
+            towards = np.array([level * np.sin(azimuth), np.sin(elevation), level * np.cos(azimuth)])
+            upwards = np.array([0.0, 1.0, 0.0])
+        towards = unit(towards)
+        right = unit(np.cross(upwards, towards))
+        directions = np.array([right, np.cross(towards, right), towards])
+        return cls._seen(surface.vertices, facets, directions, lines)
+
+    @classmethod
+    def of_pattern(cls, positions: FloatArray, facets: Facets, lines: Mapping[str, list[IntArray]]) -> View:
+        """Return the view of a pattern (#P by 2) in its plane."""
+        points = np.column_stack([positions, np.zeros(len(positions))])
+        return cls(points=points, facets=facets, lines=lines, vectors=None)
+
+    @classmethod
+    def from_side(cls, points: FloatArray, facets: Facets, degrees: float) -> View:
+        """Return a mesh (#V by 3) as seen by somebody who walked `degrees` around it to its left."""
+        c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+        return cls._seen(points, facets, np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]), {})
+
+    @classmethod
+    def around(cls, points: FloatArray, facets: Facets, sides: Iterable[tuple[str, float]] = SIDES) -> dict[str, View]:
+        """Return a mesh (#V by 3) as seen from some sides, by their titles (see :meth:`from_side`)."""
+        return {title: cls.from_side(points, facets, degrees) for title, degrees in sides}
+
+    @classmethod
+    def _seen(
+        cls, points: FloatArray, facets: Facets, directions: FloatArray, lines: Mapping[str, list[IntArray]]
+    ) -> View:
+        seen = points @ directions.T
+        vectors = area_vectors(seen, facets.triangles)
+        return cls(points=seen, facets=facets, lines=lines, vectors=vectors, directions=directions)
+
     @cached_property
     def low(self) -> FloatArray:
         """Left, bottom and back [m]."""
@@ -113,54 +158,6 @@ class View:
         """What it covers on the page, roughly [m2]."""
         per_metre = _COARSE / max(float(self.size[:2].max()), 1e-9)
         return Shot(self, per_metre).covered / per_metre**2
-
-
-def surface_view(surface: Surface, facets: Facets, lines: Mapping[str, list[IntArray]]) -> View:
-    """Return a surface seen from its front: along its mean normal, a little from the side and from above, Y upwards.
-
-    A surface that faces all directions (a skirt) is seen from +Z, one that lies flat on the ground from above.
-    """
-    vectors = area_vectors(surface.vertices, facets.triangles)
-    total, mean = float(np.linalg.norm(vectors, axis=1).sum()), vectors.sum(axis=0)
-    length = float(np.linalg.norm(mean))
-    front = mean / length if length > 0.12 * total and length > 0.0 else np.array([0.0, 0.0, 1.0])
-    aside, above = np.radians(22.0), np.radians(12.0)
-    if abs(front[1]) > 0.85:
-        towards = np.array([np.sin(aside), np.copysign(2.0, front[1]), np.copysign(1.0, front[1])])
-        upwards = np.array([0.0, 0.0, -np.copysign(1.0, front[1])])
-    else:
-        azimuth = np.arctan2(front[0], front[2]) + aside
-        elevation = np.clip(np.arcsin(np.clip(front[1], -1.0, 1.0)) + above, -1.2, 1.2)
-        level = np.cos(elevation)
-        towards = np.array([level * np.sin(azimuth), np.sin(elevation), level * np.cos(azimuth)])
-        upwards = np.array([0.0, 1.0, 0.0])
-    towards = unit(towards)
-    right = unit(np.cross(upwards, towards))
-    directions = np.array([right, np.cross(towards, right), towards])
-    return _seen(surface.vertices, facets, directions, lines)
-
-
-def pattern_view(positions: FloatArray, facets: Facets, lines: Mapping[str, list[IntArray]]) -> View:
-    """Return the view of a pattern (#P by 2) in its plane."""
-    points = np.column_stack([positions, np.zeros(len(positions))])
-    return View(points=points, facets=facets, lines=lines, vectors=None)
-
-
-def view_from_side(points: FloatArray, facets: Facets, degrees: float) -> View:
-    """Return a mesh (#V by 3) as seen by somebody who walked `degrees` around it to its left."""
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    return _seen(points, facets, np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]), {})
-
-
-def views_around(points: FloatArray, facets: Facets, sides: Iterable[tuple[str, float]] = SIDES) -> dict[str, View]:
-    """Return a mesh (#V by 3) as seen from some sides, by their titles (see :func:`view_from_side`)."""
-    return {title: view_from_side(points, facets, degrees) for title, degrees in sides}
-
-
-def _seen(points: FloatArray, facets: Facets, directions: FloatArray, lines: Mapping[str, list[IntArray]]) -> View:
-    seen = points @ directions.T
-    vectors = area_vectors(seen, facets.triangles)
-    return View(points=seen, facets=facets, lines=lines, vectors=vectors, directions=directions)
 
 
 class Shot:

@@ -161,9 +161,7 @@ def read_mesh_file(
             used = np.unique(raw.polygons[raw.polygons >= 0])
             points = raw.vertices[used[used < len(raw.vertices)]]
             points = points[np.isfinite(points).all(axis=1)]
-            sides = {
-                unit: (np.ptp(points, axis=0) * METRES_PER_UNIT[unit]).tolist() for unit in ("m", "dm", "cm", "mm")
-            }
+            sides = {unit: (np.ptp(points, axis=0) * metres).tolist() for unit, metres in METRES_PER_UNIT.items()}
             extents = {unit: " x ".join(f"{side:.3g}" for side in extent) for unit, extent in sides.items()}
             sizes = "; ".join(f'"{unit}": {extent} m' for unit, extent in extents.items())
             likely = _likely_unit(max(sides["m"]))
