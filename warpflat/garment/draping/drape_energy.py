@@ -32,9 +32,9 @@ from warpflat.kernels.membrane_cell import Cloth
 __all__ = ["DrapeEnergy"]
 
 # Stiffness of the body's skin and of friction that holds, per area [N/m3]. The body carries what presses at no depth; these
-# only hold back what changes.
-_SKIN, _GRIP = 1e6, 1e5
-# Where the depth does not fall from round to round, the skin becomes so many times as stiff.
+# only hold back what changes. A skin that is stiffer across than the cloth ends each step where some vertex comes to lie on it.
+_SKIN, _GRIP = 1.5e5, 1e5
+# Where rest is near and the depth does not fall from round to round, the skin becomes so many times as stiff.
 _STIFFER = 4.0
 # A vertex that nothing holds moves by its weight over this stiffness, so that no step of the minimisation is longer [m]
 _LONGEST_STEP = 0.05
@@ -46,7 +46,7 @@ _REACH = 0.15  # [m]
 _BALL = 0.25
 # A metric for far steps: least share of the tensile stiffness under compression, and a tension that is added in all directions [N/m].
 # Steps by a softer one are too long where cloth becomes taut, and across cloth without tension.
-_FAR_COMPRESSION, _FAR_PULL = 0.3, 10.0
+_FAR_COMPRESSION, _FAR_PULL = 0.3, 4.0
 
 
 class DrapeEnergy:
@@ -161,13 +161,13 @@ class DrapeEnergy:
         self._each(load_contact, [self.motion, self.contact, *self.forces_of])
         self._each(anchor_friction, [self.motion, self.contact])
 
-    def carry_contact(self, positions: FloatArray, *, at_rest: bool) -> None:
+    def carry_contact(self, positions: FloatArray, *, near: bool) -> None:
         """Take over the forces of body and friction at #V by 3 places [m], lay the cloth on its planes, and find the planes anew.
 
-        Where cloth at rest still presses as deep into the skin, the skin becomes stiffer.
+        Where cloth that is near rest still presses as deep into the skin, the skin becomes stiffer.
         """
         self.motion.position.assign(positions)
-        self._each(carry_contact, [self.motion, self.contact, _STIFFER if at_rest else 1.0])
+        self._each(carry_contact, [self.motion, self.contact, _STIFFER if near else 1.0])
         self._renew.launch()
         self._each(anchor_friction, [self.motion, self.contact])
 

@@ -50,7 +50,7 @@ _FALLEN = 0.4
 _MOST_ROUNDS, _STEPS_PER_ROUND = 80, 40
 # Corrections that L-BFGS remembers; hanging cloth has more soft modes than 8.
 _MEMORY = 20
-# A round ends when the mean force is at most this share of what is allowed; rest is near from so many times that on.
+# A round ends when the mean force is at most this share of what is allowed; rest is near at so many times what is allowed.
 _ROUND_ENDS, _NEARLY_AT_REST = 0.4, 20.0
 # The rounds end when, on planes found anew, the mean force is at most so many times what is allowed.
 _SETTLED = 5.0
@@ -245,7 +245,7 @@ def _minimise(energy: DrapeEnergy, tolerance: float, *, near: bool) -> float:
     while descent.iterations < _STEPS_PER_ROUND and left > _ROUND_ENDS * tolerance and descent.step():
         left = energy.mean_force(descent.point)
     left = energy.mean_force(descent.point)
-    energy.carry_contact(descent.point.positions, at_rest=left <= tolerance)
+    energy.carry_contact(descent.point.positions, near=left <= _NEARLY_AT_REST * tolerance)
     energy.renew_layers()
     energy.motion.velocity.zero_()
     return left
