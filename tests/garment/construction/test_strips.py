@@ -201,3 +201,14 @@ def test_flounce_that_is_wider_than_the_cloth_is_cut_as_equal_panels(shirt: Garm
         if "flounce" in side.piece and side.edge != "hip"
     ]
     assert len(ends) == len(set(ends)) == 2 * sum(piece.quantity for piece in panels)
+
+
+def test_no_sleeve_is_drawn_below_a_band_that_is_sewn_on_much_higher(shirt: Garment):
+    views = [
+        pattern_of(shirt, FinishingTable(kind="band", edge="wrist", width_mm=50, shorten_mm=mm)).worn.views
+        for mm in (50.0, 250.0)
+    ]
+    for name in ("front", "back"):
+        # Arms hang away from the body: the sleeve's end is the farthest from its middle.
+        far = [max(float(np.abs(ring[:, 0]).max()) for piece in row[name] for ring in piece.outlines) for row in views]
+        assert far[0] - far[1] > 0.08

@@ -123,15 +123,14 @@ def _without_lost_strips(garment: FormGarment, name: str, view: ViewedPiece, sig
             continue
         low = garment.pieces[name].surface.vertices[ids, :2] * [sign, 1.0]
         high = low + lost_there[:, :2] * [sign, 1.0]
-        # Out beyond the silhouette, which curves in between.
-        out = np.outer(_BESIDE * np.sign(low[[0, -1], 0] - low[:, 0].mean()), [1.0, 0.0])
-        around = [np.vstack([row[:1] + out[0], row, row[-1:] + out[1]]) for row in (low - [0.0, _BESIDE], high)]
-        lost = shapely.union_all(
-            [
-                shapely.MultiPoint([*around[0][k : k + 2], *around[1][k : k + 2]]).convex_hull
-                for k in range(len(low) + 1)
-            ]
-        )
+        # Out beyond the silhouette on both sides, which curves in between, and beyond the edge.
+        way = unit((high - low).mean(axis=0))
+        side = np.array([way[1], -way[0]])
+        ends = [(int((towards * low @ side).argmax()), towards * _BESIDE * side) for towards in (-1.0, 1.0)]
+        far = low - _BESIDE * way
+        cells = [(far[k : k + 2], high[k : k + 2]) for k in range(len(low) - 1)]
+        cells += [(far[k] + [0.0 * out, out], high[k] + [0.0 * out, out]) for k, out in ends]
+        lost = shapely.union_all([shapely.MultiPoint(np.concatenate(cell)).convex_hull for cell in cells])
         whole = shapely.union_all([shapely.Polygon(ring).buffer(0.0) for ring in view.outlines])
         near = _towards(garment, name, ids, sign) > _NEAR_SIDE
         rows = [shapely.LineString(line).difference(lost) for line in view.lines]
