@@ -19,7 +19,7 @@ from warpflat.garment.draping.continue_pieces import continue_pieces, hang_from_
 from warpflat.garment.draping.drape_garment import come_to_rest, hip_level, thread_elastics
 from warpflat.garment.draping.lay_around import Laid, lay_around
 from warpflat.garment.draping.lift import Lift, surface_lift, whole_lifts
-from warpflat.garment.draping.limbs import limb_lines, on_arm
+from warpflat.garment.draping.limbs import armpit_heights, limb_lines, on_arm
 from warpflat.garment.draping.mesh_pieces import FlatMesh, MeshedPieces, Weld, mesh_pieces, sew_meshes
 from warpflat.garment.draping.openings import Opening, find_openings
 from warpflat.garment.draping.options import DrapeOptions
@@ -315,7 +315,7 @@ def _sew(
     is_hooded = laid.hooded or any(piece.role == "hood" for piece in pieces.values())
     solid = _worn_body(body, head=is_hooded, device=device)
     # What begins below the arms passes through.
-    armpit = min(float(body.line(f"armhole {side}")[:, 1].min()) for side in ("left", "right"))
+    armpit = min(armpit_heights(body).values())
     below = np.zeros(len(start), dtype=bool)
     for rows in cloth.piece_vertices.values():
         below[cloth.welded[rows]] |= start[cloth.welded[rows], 1].max() < armpit
