@@ -209,7 +209,7 @@ def four_cloths(_: Path) -> Record:
 def both_models(_: Path) -> Record:
     """A bodice as springs and as a membrane, on the bias, by plain steps, and a saddle that is worn stretched."""
     bodice, saddle = (warpflat.make_shape(shape, resolution=33) for shape in ("bodice", "saddle"))
-    wear, plain = warpflat.Wear(stretch_warp=0.05, stretch_weft=0.1), warpflat.RelaxOptions(solver="plain")
+    wear, plain = warpflat.Wear(stretch_warp=0.05, stretch_weft=0.1), warpflat.RelaxOptions(solver="paper")
     return pattern_record(
         {
             "springs": warpflat.flatten(bodice, fabric="woven"),

@@ -96,9 +96,7 @@ from .solver.grain import grain_alignments as grain_alignments
 from .solver.metric import Solve as Solve
 from .solver.metric import stiffness_matrix as stiffness_matrix
 from .solver.minimise import Descent as Descent
-from .solver.options import FORMER_SOLVERS as FORMER_SOLVERS
 from .solver.options import RelaxOptions as RelaxOptions
-from .solver.options import Solver as Solver
 from .solver.options import coarse_options as coarse_options
 from .solver.options import given_options as given_options
 from .solver.steps import Relaxation as Relaxation

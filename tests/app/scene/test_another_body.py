@@ -109,6 +109,7 @@ def test_a_known_pattern_is_graded_and_keeps_its_grain(tmp_path: Path):
         assert grown > 1.04
         assert now.area / was.area == pytest.approx(grown, rel=0.003)
     assert len(result.metrics["pieces"]) == 2
+    assert result.metrics["pattern_of_file"]["unit"] == "mm"
     assert result.metrics["pattern_of_file"]["area_ratio"] == pytest.approx(0.8, abs=0.1)
     _skirt(tmp_path / "painted.obj")
     assert not FitJob.start(tmp_path / "painted.obj", units="m", body="EU 36").panels

@@ -146,7 +146,8 @@ def test_the_film_of_a_garment_refers_to_its_mannequin(tmp_path: Path) -> None:
         "pattern": {"formats": []},
     }
     scene = make_scene(settings, name="trial", folder=tmp_path, where="trial")
-    run_scene(scene, tmp_path / "first")
+    # The console lists the body with the film.
+    assert {"frames.usdc", "mannequin.usdc"} <= set(run_scene(scene, tmp_path / "first").files)
     folder = (tmp_path / "first").rename(tmp_path / "moved")  # the reference is relative to the film
 
     validate_usd(folder / "frames.usdc")

@@ -543,3 +543,5 @@ def test_no_candidates_are_told_where_there_is_no_peak_either():
     flat = warpflat.flatten(make_surface(np.stack([x, y, 0.0 * x], axis=-1).reshape(-1, 3), row, name="row"))
     with pytest.raises(InputError, match="has no line to cut along"):
         make_ledger(flat, candidates=())
+    with pytest.raises(InputError, match="by = 'per_m' is unknown; did you mean 'per_cm'\\? valid: per_cm, released"):
+        make_ledger(flat, by="per_m", candidates=())  # type: ignore[arg-type]

@@ -93,6 +93,6 @@ def test_a_gain_out_of_its_bounds_is_refused(gain: object):
         replace(RelaxOptions(), first_steps_gain=gain).validate()  # type: ignore[arg-type]
 
 
-def test_former_names_of_the_solver_are_read():
-    assert RelaxOptions(solver="multilevel").solver == "auto"  # type: ignore[arg-type]
-    assert RelaxOptions(solver="plain").solver == "paper"  # type: ignore[arg-type]
+def test_a_solver_that_there_is_not_is_refused():
+    with pytest.raises(InputError, match="solver 'plain' is unknown; valid: auto, paper"):
+        RelaxOptions(solver="plain").validate()  # type: ignore[arg-type]

@@ -224,6 +224,10 @@ def test_the_same_run_gives_the_same_bits(front: Flattening):
         (Symmetric(piece="bodice", line="left"), r"symmetric about left: the line has no faces on both sides"),
         (Symmetric(piece="bodice", line="quarter"), r"symmetric about quarter: the mesh is not its own mirror image"),
         (Straight(piece="bodice", line="ring"), r"ring straight: the line is closed"),
+        (
+            Straight(piece="bodice", line="left", along="warb"),  # type: ignore[arg-type]
+            r"left straight along warb: did you mean 'warp'\? valid: free, warp, weft",
+        ),
     ],
 )
 def test_what_cannot_be_asked_is_told_in_one_line(front: Flattening, constraint: Constraint, message: str):

@@ -108,6 +108,17 @@ def test_a_cuff_that_is_wider_than_what_it_takes_the_place_of_ends_lower():
     assert lowest[0] - lowest[1] == pytest.approx(0.04, abs=0.005)
 
 
+@pytest.mark.parametrize("kind", ["band", "ruffle", "flounce"])
+def test_nothing_is_drawn_below_what_is_sewn_on_much_higher(kind: str):
+    views = [
+        pattern_of(flat_form("skirt"), FinishingTable(kind=kind, edge="knee", width_mm=50, shorten_mm=mm)).worn.views
+        for mm in (50.0, 200.0)
+    ]
+    for name in ("front", "back"):
+        lowest = [min(float(ring[:, 1].min()) for piece in row[name] for ring in piece.outlines) for row in views]
+        assert lowest[1] - lowest[0] == pytest.approx(0.15, abs=0.01)
+
+
 def test_right_half_of_a_wrap_covers_the_left_one():
     garment = skirt(OpeningTable(kind="wrap", seam="centre front", width_mm=120), half=False)
     views = describe_worn({"": garment}, "").views

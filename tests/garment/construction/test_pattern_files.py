@@ -243,10 +243,12 @@ def test_a_pattern_may_begin_with_a_byte_order_mark(tmp_path: Path):
     assert len(read_pattern_json(file).pieces[""]) == 1
 
 
-def test_a_format_that_there_is_not_is_refused(tmp_path: Path):
+def test_a_format_or_a_tolerance_that_there_is_not_is_refused(tmp_path: Path):
     flat = flatten(make_shape("dome", resolution=5))
     with pytest.raises(InputError, match="unknown format 'png'; valid: dxf"):
         surface_files([flat], tmp_path, name="dome", options=PatternOptions(formats=("dxf", "png")))
+    with pytest.raises(InputError, match=r"tolerance = -1 is no length; give one in metres, such as 1e-4, or None"):
+        surface_files([flat], tmp_path, name="dome", options=PatternOptions(tolerance=-1))
     assert not list(tmp_path.iterdir())
 
 

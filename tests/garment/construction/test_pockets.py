@@ -16,7 +16,7 @@ from warpflat.garment.construction.shaped_band import with_shaped_waistband
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.piece_parts import Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamOpening, SeamSide
-from warpflat.pattern.drafting.sewing_order import sewing_steps
+from warpflat.pattern.drafting.sewing_order import sewing_steps, sewn_seams
 
 PATCH = PocketTable(
     kind="patch", piece="front", width_mm=120, height_mm=140, line="hip", below_mm=20, from_centre_mm=50
@@ -96,6 +96,8 @@ def test_opening_of_bags_is_notched_on_both_sides_of_the_seam():
     # The side is sewn after the bags are set in, and not across their opening.
     (bags,) = [step.words for step in sewing_steps(drafted, "") if step.technique == "inseam_bag"]
     assert "there the seam stays open" in bags
+    # Two of the four bags are one pocket.
+    assert [seam.count for seam in sewn_seams(drafted, "") if seam.name == "pocket bag"] == [2]
     with pytest.raises(InputError, match=r"ends 800 mm along 'side left'"):
         add_pockets(skirt(), [PocketTable(kind="inseam", seam="side left", width_mm=150, height_mm=400, below_mm=400)])
 

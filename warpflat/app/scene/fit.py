@@ -427,11 +427,14 @@ def fit_to(
     """
     from warpflat.app.scene.run import files_of_run, run_scene
     from warpflat.core import output_folder, record_file
+    from warpflat.flat import METRES_PER_UNIT
     from warpflat.garment import finer_body, graded_layout, with_cuts
 
     known, raw = job.panels if job.keeps_pattern(tables) else [], job.read.raw
     if known:
-        cuts = [graded_layout(panel.surface, carried.vertices[panel.of_file], panel.cut) for panel in known]
+        # In the unit that the file's own texture has.
+        per_unit = METRES_PER_UNIT[known[0].unit]
+        cuts = [graded_layout(panel.surface, carried.vertices[panel.of_file], panel.cut) / per_unit for panel in known]
         raw = with_cuts(raw, known, cuts)
     meshes = {
         f"{name}.fitted.obj": _obj_lines(carried.vertices, raw),

@@ -317,6 +317,7 @@ class Film:
                     from warpflat.garment import Body, write_mannequin_usd
 
                     write_mannequin_usd(self._mannequin, self._folder / MANNEQUIN)
+                    self.files.append(MANNEQUIN)
                     layout = self._mannequin.layout
                     body = Body(self._mannequin.vertices, layout.faces[layout.on_body], device=wp.get_device("cpu"))
                     writer.refer_to_body(MANNEQUIN, body.shrunk)

@@ -128,7 +128,7 @@ SCENE_OPTIONS: Mapping[str, SceneOption] = {
     "wear.pressure": SceneOption("--pressure PA", "On the skin; sets the stretch that runs around the body.", float),
     "relax.solver": SceneOption(
         "--solver",
-        "Paper: the paper's steps alone.  [default: auto]", ("auto", "paper", "multilevel", "plain"),
+        "Paper: the paper's steps alone.  [default: auto]", ("auto", "paper"),
     ),
     "relax.max_steps": SceneOption("--max-steps N", "Give up after the work of so many steps.", int),
     "relax.time_step": SceneOption("--time-step SECONDS", "Of the approximate implicit integration.", float),

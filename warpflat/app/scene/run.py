@@ -23,7 +23,6 @@ from warpflat.core import (
     Beside,
     StepError,
     expect_files,
-    latest_file,
     notes_left_out,
     optional_file,
     optional_step,
@@ -222,10 +221,8 @@ def _run(
                     pictures=shown,
                 )
 
-    # The body belongs to the film.
-    known = [*files, *([MANNEQUIN] if latest_file(folder / MANNEQUIN) != folder / MANNEQUIN else [])]
     drape = settings.drape is not None
-    metrics, manifest_notes = remove_stale(folder, measured, name=scene.name, files=known, drape=drape)
+    metrics, manifest_notes = remove_stale(folder, measured, name=scene.name, files=files, drape=drape)
     name_notes = note_on_names(garment.parts) if output.picture else ()
     size = ""
     if isinstance(settings.surface, FileSurface):

@@ -18,7 +18,7 @@ from pydantic import (
 
 from warpflat.app.scene.first_shapes import PIECES
 from warpflat.core import Table, is_number, plain_name, quote_value
-from warpflat.flat import DEFAULT_FABRIC, FORMER_SOLVERS, AutoCutTable, FabricTable, RelaxOptions, Solver
+from warpflat.flat import DEFAULT_FABRIC, AutoCutTable, FabricTable, RelaxOptions
 from warpflat.garment import Direction, FinishingTable, FormDart, MannequinTable, OpeningTable, PocketTable, SeamTable
 
 if TYPE_CHECKING:
@@ -437,15 +437,9 @@ class MarkerTable(Table):
     """The cloth is folded lengthwise: halves lie against its fold, pairs are cut at once."""
 
 
-def _as_solver(value: object) -> object:
-    """Read the names of earlier versions."""
-    return FORMER_SOLVERS.get(value, value) if isinstance(value, str) else value
-
-
 _RELAX_FIELDS: dict[str, Any] = {
     field.name: (get_type_hints(RelaxOptions)[field.name] | None, None) for field in dataclasses.fields(RelaxOptions)
 }
-_RELAX_FIELDS["solver"] = (Annotated[Solver | None, BeforeValidator(_as_solver)], None)
 if TYPE_CHECKING:
     RelaxTable = Table
 else:

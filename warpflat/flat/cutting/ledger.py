@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
+from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import polyline_length
 from warpflat.core.short_repr import short_repr
 from warpflat.flat.cutting.auto_cut import AutoCutTable, RankedBy
@@ -252,7 +252,12 @@ def best_of_few(
         evaluate: tries one.
         by: what the order goes by: energy released per centimetre cut, or in all.
         listed: eight are tried, to be compared; else three, of which one is chosen.
+
+    Raises:
+        InputError: `by` is unknown.
     """
+    if by not in get_args(RankedBy):
+        raise InputError(f"by = {by!r} is unknown; {nearest(str(by), get_args(RankedBy))}")
     most = _LISTED if listed else TRIED
 
     def promise(cost: Price) -> tuple[bool, float]:
@@ -289,7 +294,7 @@ def make_ledger(
         listed: see :func:`best_of_few`.
 
     Raises:
-        InputError: there is nothing to cut for, or no candidate can be made.
+        InputError: `by` is unknown, there is nothing to cut for, or no candidate can be made.
     """
     words = peaks_in_words(result)
     peak = f" ({words[0]})" if words else ""

@@ -8,12 +8,10 @@ from typing import Literal
 
 from warpflat.core.errors import InputError, expect, is_number, nearest
 
-__all__ = ["FORMER_SOLVERS", "SOLVERS", "RelaxOptions", "Solver", "coarse_options", "given_options"]
+__all__ = ["SOLVERS", "RelaxOptions", "Solver", "coarse_options", "given_options"]
 
 Solver = Literal["auto", "paper"]
 SOLVERS: tuple[Solver, ...] = ("auto", "paper")
-#: Names of earlier versions, and what they are read as.
-FORMER_SOLVERS: dict[str, Solver] = {"multilevel": "auto", "plain": "paper"}
 # Coarse options: tolerances looser by this factor, and few steps.
 _LOOSER, _COARSE_STEPS = 10.0, 600
 
@@ -56,10 +54,6 @@ class RelaxOptions:
     solver: Solver = "auto"
     gap_mm: float = 0.5
     contact_share: float = 0.05
-
-    def __post_init__(self) -> None:
-        if isinstance(self.solver, str):
-            object.__setattr__(self, "solver", FORMER_SOLVERS.get(self.solver, self.solver))
 
     def validate(self) -> None:
         """Raise InputError, with its name, for a value out of its bounds."""

@@ -225,9 +225,10 @@ def equations_of_constraint(
             line = line[: 1 + np.searchsorted(arc_lengths(surface.vertices[line]), constraint.reach)]
         if constraint.along == "free":
             return straight_equations(line), False
-        warp, weft = grain_axes(piece.grain_angle)
-        across = level_equations(line, weft if constraint.along == "warp" else warp)
-        return one_group(straight_equations(line), across), True
+        across = dict(zip(("weft", "warp"), grain_axes(piece.grain_angle), strict=True))
+        if constraint.along not in across:
+            raise InputError(f"{constraint.name}: {nearest(str(constraint.along), ('free', *across))}")
+        return one_group(straight_equations(line), level_equations(line, across[constraint.along])), True
     try:
         partner = mirror_partners(surface.faces, line, vertex_count=len(surface.vertices))
     except InputError as error:

@@ -12,16 +12,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import BoolArray, FloatArray, arc_lengths, line_name, other_side, unit
+from warpflat.core import BoolArray, FloatArray, IntArray, arc_lengths, line_name, other_side, unit
 from warpflat.flat import triangulate, vertex_normals
 from warpflat.garment.mannequin.slicer import UP
 from warpflat.pattern import ViewedPiece
 
 if TYPE_CHECKING:
+    from warpflat.flat import Surface
     from warpflat.garment.construction.details import FinishingTable
     from warpflat.garment.construction.form_garment import FormGarment
 
-__all__ = ["Rises", "finishing_views", "rise_along"]
+__all__ = ["Rises", "finishing_views", "lost_along"]
 
 # Ends of edges that are nearer than this are sewn to each other [m]; points of a chain lie so far apart.
 _MEET, _STEP = 0.012, 0.004
@@ -83,7 +84,24 @@ class _Sheet:
     outlined: bool = True
 
 
-def rise_along(garment: FormGarment, piece: str, edge: str, rises: Rises) -> FloatArray:
+def lost_along(garment: FormGarment, piece: str, edge: str, rises: Rises) -> FloatArray:
+    """Return how far the end of the cloth lies from each vertex of an edge (#V by 3 [m]): slanted, or shorter by more than is sewn on."""
+    surface, ids = garment.form.pieces[piece].surface, garment.form.pieces[piece].edges[edge]
+    for wish in garment.finishing:
+        if isinstance(wish.shorten, float) and wish.shorten > wish.width and wish.edge == line_name(edge):
+            return -wish.shorten * _off_edge(surface, ids, surface.vertices[ids])[1]
+    return np.outer(_rise_along(garment, piece, edge, rises), UP)
+
+
+def _off_edge(surface: Surface, ids: IntArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the normals at an edge's vertices, and the ways along the cloth and off the edge, which lies at some points (#V by 3)."""
+    out = vertex_normals(surface.vertices, triangulate(surface.faces)[0])[ids]
+    beyond = unit(np.cross(np.gradient(points, axis=0), out))
+    away = surface.vertices[ids] - surface.vertices.mean(axis=0)
+    return out, beyond if (away * beyond).sum() >= 0.0 else -beyond
+
+
+def _rise_along(garment: FormGarment, piece: str, edge: str, rises: Rises) -> FloatArray:
     """Return how wide a strip slanted edges lose at each vertex of an edge [m]."""
     # Of a pair the left piece is drawn, which runs the other way.
     turned = (piece, edge) not in rises
@@ -145,17 +163,11 @@ def _chains(garment: FormGarment, called: str, rises: Rises) -> Iterator[_Chain]
     form = garment.form
     rows = list[tuple[FloatArray, FloatArray, FloatArray]]()
     for name, piece in form.pieces.items():
-        surface = piece.surface
-        triangles, _ = triangulate(surface.faces)
-        normals = vertex_normals(surface.vertices, triangles)
         for edge, ids in piece.edges.items():
             if line_name(edge) != called:
                 continue
-            out, away = normals[ids], surface.vertices[ids] - surface.vertices.mean(axis=0)
-            points = surface.vertices[ids] + np.outer(rise_along(garment, name, edge, rises), UP)
-            beyond = unit(np.cross(np.gradient(points, axis=0), out))
-            if (away * beyond).sum() < 0.0:
-                beyond = -beyond
+            points = piece.surface.vertices[ids] + np.outer(_rise_along(garment, name, edge, rises), UP)
+            out, beyond = _off_edge(piece.surface, ids, points)
             rows.append((points, out, beyond))
             if form.half:
                 rows.append((points * [-1.0, 1.0, 1.0], out * [-1.0, 1.0, 1.0], beyond * [-1.0, 1.0, 1.0]))

@@ -14,7 +14,7 @@ import numpy as np
 from warpflat.core import FloatArray, IntArray, arc_lengths, other_side, points_at_lengths, unit, without_side
 from warpflat.flat import area_vectors, border_loops, judge, triangulate, vertex_normals
 from warpflat.garment.construction.button_stand import button_depths
-from warpflat.garment.construction.drawn_finishing import Rises, finishing_views, rise_along
+from warpflat.garment.construction.drawn_finishing import Rises, finishing_views, lost_along
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.mark_openings import TIE_WIDTH
 from warpflat.garment.construction.openings import place_opening
@@ -68,7 +68,7 @@ def describe_worn(
         seen = [drawn[k][index] for k in order]
         if on_form is not None:
             names = [list(garment.pieces)[k] for k in order]
-            seen = [_with_slanted_hems(on_form, *each, sign, rises) for each in zip(names, seen, strict=True)]
+            seen = [_without_lost_strips(on_form, *each, sign, rises) for each in zip(names, seen, strict=True)]
             behind, before = finishing_views(on_form, sign, rises)
             seen = [*behind, *_wrapped(on_form, seen, names, sign), *before, *_openings(on_form, sign)]
             seen += _pockets(on_form, pieces, sign)
@@ -113,16 +113,16 @@ def describe_worn(
     )  # fmt: skip
 
 
-def _with_slanted_hems(garment: FormGarment, name: str, view: ViewedPiece, sign: float, rises: Rises) -> ViewedPiece:
-    """Return a piece as it is seen without the strips that slanted hems lose, which lie above their edges."""
+def _without_lost_strips(garment: FormGarment, name: str, view: ViewedPiece, sign: float, rises: Rises) -> ViewedPiece:
+    """Return a piece as it is seen without the strips that it loses along its edges: above slanted hems, and beyond what is sewn on."""
     import shapely
 
     for edge, ids in garment.form.pieces[name].edges.items():
-        rise = rise_along(garment, name, edge, rises)
-        if not rise.any():
+        lost_there = lost_along(garment, name, edge, rises)
+        if not lost_there.any():
             continue
         low = garment.pieces[name].surface.vertices[ids, :2] * [sign, 1.0]
-        high = low + np.outer(rise, [0.0, 1.0])
+        high = low + lost_there[:, :2] * [sign, 1.0]
         # Out beyond the silhouette, which curves in between.
         out = np.outer(_BESIDE * np.sign(low[[0, -1], 0] - low[:, 0].mean()), [1.0, 0.0])
         around = [np.vstack([row[:1] + out[0], row, row[-1:] + out[1]]) for row in (low - [0.0, _BESIDE], high)]

@@ -194,14 +194,14 @@ def sewn_panels(raw: RawMesh, scale: float, *, name: str = "panel") -> list[Sewn
 
 
 def with_cuts(raw: RawMesh, panels: Sequence[SewnPanel], cuts: Sequence[FloatArray]) -> RawMesh:
-    """Return the mesh of a file with other cuts of its panels as its texture, in metres; what belongs to no panel has none.
+    """Return the mesh of a file with other cuts of its panels as its texture; what belongs to no panel has none.
 
     Corners of faces that repair has dropped go with the nearest vertex of the old texture.
 
     Args:
         raw: the mesh of which they are the panels.
         panels: of :func:`sewn_panels`.
-        cuts: for each of them #V by 2 [m].
+        cuts: for each of them #V by 2, in the unit of the old texture.
     """
     from scipy.spatial import cKDTree
 

@@ -33,7 +33,7 @@ def finished_lengths(garment: DraftedGarment, size: str) -> dict[str, float]:
     drafted = {piece.name: as_worn(piece) for piece in garment.pieces[size]}
     pieces = [piece for piece in drafted.values() if piece.piece.role == "shell" and not is_flounce(piece.piece)]
     legs = any(line_name(seam.name) == "inseam" for seam in garment.seams)
-    banded = any(piece.piece.role == "waistband" for piece in drafted.values())
+    banded = has_waistband = any(piece.piece.role == "waistband" for piece in drafted.values())
     found: dict[str, float] = {}
     for line, words in _LINES.items():
         # Along pieces that lie below each other; left and right, and front and back of a leg or sleeve, are one length.
@@ -66,6 +66,8 @@ def finished_lengths(garment: DraftedGarment, size: str) -> dict[str, float]:
             words = "side, below the armhole"
         elif line == "outseam" and banded:
             words = "outer leg, below the waistband"
+        elif line == "centre back" and has_waistband:
+            words = "length at the centre back, below the waistband"
         if lengths and (ends or line in ("outseam", "inseam")) and not (legs and line == "centre back"):
             found[translate(words)] = sum(lengths.values())
     hems: dict[str, float] = {}

@@ -122,8 +122,10 @@ class SewingTasks:
         joined = [self.pieces[side.piece] for side in seam.stretches]
         # A copy that is turned over is of another pair, unless both sides are one piece's: then it is sewn across the centre.
         across = any(side.mirrored for side in seam.stretches) and len({piece.name for piece in joined}) == 1
-        within = not across and not any(side.copy for side in seam.stretches)
-        if within and all(piece.quantity == 2 and not piece.on_fold for piece in joined):
+        # Of four bags two are one pocket, and sewn to each other.
+        needed = (4 if joined[0].role == "pocket" else 0) if across else 2
+        copied = any(side.copy for side in seam.stretches)
+        if not copied and all(piece.quantity == needed and not piece.on_fold for piece in joined):
             return True
         return other != seam.name and all(piece.on_fold or piece.is_pair for piece in joined)
 

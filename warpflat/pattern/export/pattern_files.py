@@ -15,6 +15,7 @@ from warpflat.core import (
     file_in,
     foreign_words,
     format_count,
+    is_number,
     listening_to_left_out,
     make_file_name,
     nearest,
@@ -266,7 +267,7 @@ def write_pattern(
         options: formats, rules and cloth.
 
     Raises:
-        InputError: an unknown format, or the folder cannot be written.
+        InputError: an unknown format, a tolerance that is no length, or the folder cannot be written.
     """
     from warpflat.pattern.drafting.curves import TOLERANCE
     from warpflat.pattern.drafting.cut_list import cut_list
@@ -276,6 +277,8 @@ def write_pattern(
     from warpflat.pattern.export.pdf import too_many_sheets
 
     _check_formats(options.formats)
+    if options.tolerance is not None and not (is_number(options.tolerance) and options.tolerance >= 0.0):
+        raise InputError(f"tolerance = {options.tolerance!r} is no length; give one in metres, such as 1e-4, or None")
     if not options.formats and options.cloth is None:
         return WrittenPattern()
     report_activity("drafting the pattern")
