@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Set
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from warpflat.core import FloatArray, InputError, IntArray, polyline_length, project_on_segments, turned_left, unit
-from warpflat.garment.draping.mesh_pieces import FlatMesh, MeshedPieces, Weld
+from warpflat.garment.draping.mesh_pieces import FlatMesh, MeshedPieces
 
 __all__ = ["continue_pieces", "hang_from_edges", "hood_beside_head"]
 
@@ -18,19 +18,22 @@ _HANGS = -0.8
 _NEXT = 4
 
 
-def _joins(welds: Sequence[Sequence[Weld]]) -> list[tuple[tuple[str, str], tuple[IntArray, IntArray]]]:
-    """Return two pieces and the vertices of each for all that a seam joins, either first; a piece with itself too."""
-    joins = []
-    for seam in welds:
+def _seams_to(
+    lying: Collection[str], meshed: MeshedPieces, names: Collection[str]
+) -> dict[str, list[tuple[str, IntArray, IntArray]]]:
+    """Return by name the seams of pieces to those that lie: which, and the vertices that are joined, its own and those of that one."""
+    found: dict[str, list[tuple[str, IntArray, IntArray]]] = {name: [] for name in names}
+    for seam in meshed.welds:
         pairs: dict[tuple[str, str], list[tuple[int, int]]] = {}
         for (piece, vertex), *others in seam:
             for other, its in others:
                 pairs.setdefault((piece, other), []).append((vertex, its))
         for (piece, other), rows in pairs.items():
-            if len(rows) > 1:
-                first, second = np.array(rows, dtype=np.int32).T
-                joins += [((piece, other), (first, second)), ((other, piece), (second, first))]
-    return joins
+            first, second = np.array(rows, dtype=np.int32).T
+            for name, lies, own, its in ((piece, other, first, second), (other, piece, second, first)):
+                if name in found and lies in lying and len(rows) > 1:
+                    found[name].append((lies, own, its))
+    return found
 
 
 def continue_pieces(
@@ -50,21 +53,21 @@ def continue_pieces(
     """
     found, meshes = dict(placed), meshed.meshes
     while lost := [name for name in meshes if name not in found]:
-        # By piece its vertices that are sewn, the places of these, and where the piece's x and y lead from there.
-        sewn: dict[str, list[tuple[IntArray, FloatArray, FloatArray]]] = {name: [] for name in lost}
-        for (name, other), (own, its) in _joins(meshed.welds):
-            if name in lost and other in found:
-                across = _border_frames(meshes[name], own).transpose(0, 2, 1)
-                # Into this piece is out of the other one, or back into it.
-                flat = _border_frames(meshes[other], its) * [1.0, 1.0 if name in turned_down else -1.0] @ across
-                sewn[name].append((own, found[other][its], _slopes(meshes[other], found[other])[its] @ flat))
+        sewn = _seams_to(found, meshed, lost)
         lengths = {
-            name: sum(polyline_length(meshes[name].points[own]) for own, _, _ in rows) for name, rows in sewn.items()
+            name: sum(polyline_length(meshes[name].points[own]) for _, own, _ in rows) for name, rows in sewn.items()
         }
         name = max(lost, key=lambda each: lengths[each])
         if not sewn[name]:
             raise InputError(f"piece {name!r} is sewn to no piece that has a designed surface")
-        own, place, way = (np.concatenate(column) for column in zip(*sewn[name], strict=True))
+        # The vertices that are sewn, their places, and where the piece's x and y lead from there.
+        rows = []
+        for other, own, its in sewn[name]:
+            across = _border_frames(meshes[name], own).transpose(0, 2, 1)
+            # Into this piece is out of the other one, or back into it.
+            flat = _border_frames(meshes[other], its) * [1.0, 1.0 if name in turned_down else -1.0] @ across
+            rows.append((own, found[other][its], _slopes(meshes[other], found[other])[its] @ flat))
+        own, place, way = (np.concatenate(column) for column in zip(*rows, strict=True))
         flat = meshes[name].points
         far, near = cKDTree(flat[own]).query(flat, k=min(_NEXT, len(own)))
         weight = 1.0 / np.maximum(far, 1e-6) ** 2
@@ -88,20 +91,15 @@ def hang_from_edges(
         By piece its points, #P by 3 [m].
     """
     meshes = meshed.meshes
-    rows: dict[str, list[tuple[IntArray, FloatArray, FloatArray]]] = {name: [] for name in falling}
-    for (name, other), (own, its) in _joins(meshed.welds):
-        if name in falling and other in placed:
-            out = -_border_frames(meshes[other], its)[:, :, 1:]
-            down = (_slopes(meshes[other], placed[other])[its] @ out)[:, :, 0]
-            rows[name].append((own, placed[other][its], down))
-    found, sewn = {}, {name: seams for name, seams in rows.items() if seams}
-    middle = np.concatenate([place for seams in sewn.values() for _, place, _ in seams] or [np.zeros((1, 3))]).mean(
-        axis=0
-    )
+    found, sewn = {}, {name: seams for name, seams in _seams_to(placed, meshed, falling).items() if seams}
+    edges = [placed[other][its] for seams in sewn.values() for other, _, its in seams]
+    middle = np.concatenate(edges or [np.zeros((1, 3))]).mean(axis=0)
     for name, seams in sewn.items():
         flat, best = meshes[name].points, np.full(len(meshes[name].points), np.inf)
         found[name] = np.empty((len(flat), 3))
-        for own, place, down in seams:
+        for other, own, its in seams:
+            out = -_border_frames(meshes[other], its)[:, :, 1:]
+            place, down = placed[other][its], (_slopes(meshes[other], placed[other])[its] @ out)[:, :, 0]
             share, off = project_on_segments(flat[:, None], flat[own[:-1]], flat[own[1:]])
             nearest_side = off.argmin(axis=1)
             points, here = np.arange(len(flat)), off.min(axis=1) < best
@@ -116,7 +114,7 @@ def hang_from_edges(
 
 
 def hood_beside_head(
-    placed: Mapping[str, FloatArray], meshed: MeshedPieces, hood: Collection[str], beside: float
+    placed: Mapping[str, FloatArray], meshed: MeshedPieces, hood: Set[str], beside: float
 ) -> dict[str, FloatArray]:
     """Place the halves of a hood flat beside a head, upright as they are drawn, with the middles of their seams at the neckline's.
 
@@ -130,15 +128,12 @@ def hood_beside_head(
         By half its points, #P by 3 [m].
     """
     meshes = meshed.meshes
-    rows: dict[str, list[tuple[IntArray, FloatArray]]] = {name: [] for name in hood}
-    for (name, other), (own, its) in _joins(meshed.welds):
-        if name in hood and other in placed and other not in hood:
-            rows[name].append((own, placed[other][its]))
     found = {}
-    for name, seams in rows.items():
+    for name, seams in _seams_to(placed.keys() - hood, meshed, hood).items():
         if not seams:
             continue
-        own, neckline = (np.concatenate(column) for column in zip(*seams, strict=True))
+        own = np.concatenate([own for _, own, _ in seams])
+        neckline = np.concatenate([placed[other][its] for other, _, its in seams])
         side = float(np.sign(neckline[:, 0]).mean())
         if abs(side) > 0.5:
             off = meshes[name].points - meshes[name].points[own].mean(axis=0)

@@ -192,8 +192,13 @@ def correct_pattern(
         if history[-1].misfit <= wanted:
             reason = "the misfit is as wanted"
             break
-        mend, step = _gauss_newton_step(drape, seams, difference, bridging)
-        best, share = None, largest_share(drape.cloth, mend + step)
+        # What the cells ask for, by Gauss and Newton's method.
+        asked = _lengths(drape.cloth, shape) - _lengths(drape.cloth, drape.positions)
+        if bridging:
+            unexplained = drape.misfit / np.maximum(drape.distance, 1e-9)
+            asked *= unexplained[drape.cloth.cells()[0]].mean(axis=1)[:, None]
+        mend, step = _follow(drape.cloth, asked, seams, difference)
+        share = largest_share(drape.cloth, mend + step)
         for _ in range(_HALVINGS + 1):
             trial = wear(replace(drape.cloth, flat=drape.cloth.flat + mend + share * step))
             now = _round(trial, share, bridging)
@@ -202,13 +207,12 @@ def correct_pattern(
                 and now.misfit < history[-1].misfit
                 and now.strained <= history[0].strained + _MORE_STRAINED
             ):
-                best = trial
                 break
             share *= 0.5
-        if best is None:
+        else:
             reason = "no step lowers the misfit"
             break
-        drape, gain = best, 1.0 - now.misfit / history[-1].misfit
+        drape, gain = trial, 1.0 - now.misfit / history[-1].misfit
         history.append(now)
         if callback is not None:
             callback(number, now)
@@ -280,25 +284,6 @@ def relieve_pattern(drape: Drape, *, hold: Sequence[str] = (), rounds: int = 6) 
     return Correction(before=before, after=drape, rounds=tuple(history), reason=reason)
 
 
-def _gauss_newton_step(
-    drape: Drape, seams: IntArray, difference: FloatArray, bridging: bool
-) -> tuple[FloatArray, FloatArray]:
-    """Return the displacements of the flat vertices (#P by 2 [m]) that mend the seams, and that follow best what the cells ask for.
-
-    Args:
-        drape: of the present pattern.
-        seams: #S by 2 by 2, the edges of the outline that are sewn together.
-        difference: #S, the wanted difference of their lengths [m].
-        bridging: whether what bridges a hollow is as it should be.
-    """
-    cloth = drape.cloth
-    wanted = _lengths(cloth, cloth.designed) - _lengths(cloth, drape.positions)
-    if bridging:
-        share = drape.misfit / np.maximum(drape.distance, 1e-9)
-        wanted *= share[cloth.cells()[0]].mean(axis=1)[:, None]
-    return _follow(cloth, wanted, seams, difference)
-
-
 def _follow(
     cloth: SewnCloth, wanted: FloatArray, seams: IntArray, difference: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -310,7 +295,8 @@ def _follow(
     Args:
         cloth: with the present pattern.
         wanted: #C by 3, strains.
-        seams, difference: as :func:`_gauss_newton_step` takes them.
+        seams: #S by 2 by 2, the edges of the outline that are sewn together.
+        difference: #S, the wanted difference of their lengths [m].
     """
     _, face, gradient, area = cloth.cells()
     corner_flat, _, _ = corner_triangles(cloth.flat_faces)

@@ -57,11 +57,11 @@ def drape(
     Raises:
         InputError: no piece, pieces of different cloths, half pieces, mirrored faces, an unknown line, or nothing holds the garment.
     """
-    cloth = sew_cloth(garment)
+    cloth, pieces = sew_cloth(garment), pieces_of(garment)
     start_warp()
     where = wp.get_device(device)
-    if body is None:
-        body = garment.mannequin if isinstance(garment, FormGarment) else None
+    mannequin = garment.mannequin if isinstance(garment, FormGarment) else None
+    body = mannequin if body is None else body
     surface = body.surface() if isinstance(body, Mannequin) else body
     gripped: list[str] = []
     if surface is None:
@@ -72,15 +72,15 @@ def drape(
         designed = Body(cloth.designed, cloth.faces, device=where)
     options = options or DrapeOptions()
     worn, frames = come_to_rest(cloth, solid, [*hold, *gripped], options, callback)
-    sources = tuple(source for piece in pieces_of(garment).values() for source in piece.surface.sources)
+    sources = tuple(source for piece in pieces.values() for source in piece.surface.sources)
     # A cut that `warpflat.advise` has found on one side stands for that on the other side of the body, too.
     cuts = {}
-    for name, piece in pieces_of(garment).items():
+    for name, piece in pieces.items():
         paths = [(remedy.words.partition(",")[0], piece.surface.vertices[remedy.path]) for remedy in piece.remedies]
         cuts[name] = [(words, np.concatenate([path, path * [-1.0, 1.0, 1.0]])) for words, path in paths]
     return Drape(
         cloth=cloth, worn=worn, body=solid, designed=designed, options=options, sources=sources, frames=frames,
-        hangs_below=hip_level(garment.mannequin if isinstance(garment, FormGarment) else None), cuts=cuts, threaded=gripped,
+        hangs_below=hip_level(mannequin), cuts=cuts, threaded=gripped,
     )  # fmt: skip
 
 

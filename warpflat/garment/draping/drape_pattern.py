@@ -19,8 +19,8 @@ from warpflat.garment.draping.continue_pieces import continue_pieces, hang_from_
 from warpflat.garment.draping.drape_garment import come_to_rest, hip_level, thread_elastics
 from warpflat.garment.draping.lay_around import Laid, lay_around
 from warpflat.garment.draping.lift import Lift, surface_lift, whole_lifts
-from warpflat.garment.draping.limbs import limb_lines, on_arm
-from warpflat.garment.draping.mesh_pieces import FlatMesh, MeshedPieces, Weld, mesh_pieces, sew_meshes
+from warpflat.garment.draping.limbs import armpit_heights, limb_lines, on_arm
+from warpflat.garment.draping.mesh_pieces import FlatMesh, MeshedPieces, mesh_pieces, sew_meshes
 from warpflat.garment.draping.openings import Opening, find_openings
 from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.result import Drape
@@ -137,10 +137,8 @@ def drape_pattern(
     hood = {name for name, piece in pieces.items() if piece.role == "hood"}
     solid = None if body is None else _worn_body(body, head=bool(hood), device=where)
     # On another body than that of its designed surface a garment starts as one that has none, if it can.
-    placed = {name: lifts[name](mesh.points) for name, mesh in meshes.items() if name in lifts}
+    placed = _where_designed(meshed, lifts)
     lifted = len(placed) == len(meshes) or bool(placed and body is not None)
-    if lifted:
-        placed = _mirrored_in_place(placed, meshed.welds)
     elsewhere = _elsewhere(placed, meshes, solid) if lifted and solid is not None else ""
     if not lifted and body is None:
         raise InputError(f'pattern {pattern.name!r} has no designed surface; name a body: --body "EU 38"')
@@ -225,8 +223,7 @@ def place_drafted(
     start_warp()
     hooded = any(piece.role == "hood" for piece in pieces.values())
     solid = _worn_body(body, head=hooded, device=wp.get_device("cpu"))
-    placed = {name: whole[name](mesh.points) for name, mesh in meshes.items() if name in whole}
-    placed = _mirrored_in_place(placed, meshed.welds)
+    placed = _where_designed(meshed, whole)
     falling = {name: _FLOUNCE_FLARES for name in drafted if is_flounce(pieces[name])}
     falling |= {
         side.piece: _GATHERS_FLARE
@@ -315,7 +312,7 @@ def _sew(
     is_hooded = laid.hooded or any(piece.role == "hood" for piece in pieces.values())
     solid = _worn_body(body, head=is_hooded, device=device)
     # What begins below the arms passes through.
-    armpit = min(float(body.line(f"armhole {side}")[:, 1].min()) for side in ("left", "right"))
+    armpit = min(armpit_heights(body).values())
     below = np.zeros(len(start), dtype=bool)
     for rows in cloth.piece_vertices.values():
         below[cloth.welded[rows]] |= start[cloth.welded[rows], 1].max() < armpit
@@ -340,22 +337,24 @@ def _continued(placed: Mapping[str, FloatArray], meshed: MeshedPieces, body: Man
     return continue_pieces(found, meshed, turned_down(meshed.pieces))
 
 
-def _mirrored_in_place(placed: Mapping[str, FloatArray], welds: Sequence[Sequence[Weld]]) -> dict[str, FloatArray]:
-    """Return places (#P by 3 [m] by piece) with what is cut turned over on the other side of the garment's own plane of symmetry.
+def _where_designed(meshed: MeshedPieces, lifts: Mapping[str, Lift]) -> dict[str, FloatArray]:
+    """Return the places (#P by 3 [m] by piece) of pieces that have a designed surface.
 
-    A garment may stand beside x = 0 and lean: its plane is that in which pieces turned over come to the seams of the others.
+    What is cut turned over lies on the other side of the garment's own plane of symmetry. A garment may stand beside x = 0 and lean: its
+    plane is that in which pieces turned over come to the seams of the others.
     """
+    placed = {name: lifts[name](mesh.points) for name, mesh in meshed.meshes.items() if name in lifts}
     across = np.array([-1.0, 1.0, 1.0])
     met = [
         (placed[turned][i] * across, placed[other][j])
-        for seam in welds
+        for seam in meshed.welds
         for joint in seam
         for turned, i in joint
         for other, j in joint
         if turned.endswith(MIRRORED) and not other.endswith(MIRRORED) and {turned, other} <= placed.keys()
     ]
     if not met:
-        return dict(placed)
+        return placed
     normal, off = mirror_plane(*np.array(met).transpose(1, 0, 2))
     return {
         name: reflected(points * across, normal, off) if name.endswith(MIRRORED) else points

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, permutations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from warpflat.core import BoolArray, FloatArray, InputError, IntArray, factor_symmetric, polyline_length, unit
 from warpflat.flat import border_edges
+from warpflat.garment.draping.limbs import armpit_heights
 from warpflat.garment.draping.openings import Opening
 from warpflat.garment.draping.sew_around import AsRigid
 from warpflat.garment.draping.sewn_cloth import SewnCloth
@@ -117,7 +118,7 @@ def lay_around(
     _, part = connected_components(graph, directed=False)
     laid, limbs, hooded, rings = np.zeros((len(cloth.designed), 3)), [""] * len(openings), False, list[_Ring]()
     level, under = np.zeros(len(laid), dtype=bool), dict[str, NDArray[np.intp]]()
-    tops = list[tuple[BoolArray, _Ring]]()
+    tops, armpits = list[tuple[BoolArray, _Ring]](), armpit_heights(body)
     for own in np.unique(part):
         rows = [k for k, each in enumerate(openings) if part[each.vertices[0]] == own]
         parted = [openings[k] for k in rows]
@@ -126,10 +127,11 @@ def lay_around(
         kinds = _kinds(parted, far, up, polyline_length(body.line("waist"), closed=True))
         highest = parted[kinds.index("neck" if "neck" in kinds else "waist")].vertices
         high = float(body.line("collar")[:, 1].mean()) if "neck" in kinds else top(float(up[highest].mean()))
+        from_low = far[[k for k, kind in enumerate(kinds) if kind in ("hem", "leg")]].min(axis=0)
         # Without another sign the highest edge is deeper in front, nearer to the lowest ones.
         looks = hints * (part == own)[:, None]
         if not looks.any():
-            looks[highest, 2] = -far[[k for k, kind in enumerate(kinds) if kind in ("hem", "leg")]].min(axis=0)[highest]
+            looks[highest, 2] = -from_low[highest]
         trials = []
         for swapped in (False, True):
             named, hood = _name_limbs(kinds, parted, far, swapped=swapped)
@@ -144,12 +146,11 @@ def lay_around(
         hooded |= hood
         for k, name in zip(rows, named, strict=True):
             limbs[k] = name if name.endswith(("arm", "leg")) else ""
-        low = [k for k, kind in enumerate(kinds) if kind in ("hem", "leg")]
-        for k, name in enumerate(named):
+        for name, from_end in zip(named, far, strict=True):
             if name.endswith("arm"):
-                armpit = float(body.line(f"armhole {name.removesuffix(' arm')}")[:, 1].min())
-                both = np.where(part == own, far[k] + far[low].min(axis=0), np.inf)
-                under[name] = np.flatnonzero((both < _UNDERARM * both.min()) & (places[:, 1] > armpit - _BESIDE_ARMPIT))
+                both = np.where(part == own, from_end + from_low, np.inf)
+                on_side = places[:, 1] > armpits[name] - _BESIDE_ARMPIT
+                under[name] = np.flatnonzero((both < _UNDERARM * both.min()) & on_side)
     for weight, rounds in _HOLDS:
         held = np.zeros(len(laid))
         held[np.concatenate([ring.vertices for ring in rings] + list(under.values()))] = weight
@@ -160,11 +161,8 @@ def lay_around(
                 target[ring.vertices] = ring.nearest_places(laid[ring.vertices])
             for arm, below_arm in under.items():
                 _, armhole, wrist, _ = lines[arm]
-                drop = armhole[1] - body.line(f"armhole {arm.removesuffix(' arm')}")[:, 1].min()
-                below = (
-                    np.interp(np.abs(laid[below_arm, 0]), np.abs([armhole[0], wrist[0]]), [armhole[1], wrist[1]]) - drop
-                )
-                target[below_arm, 1] = np.minimum(target[below_arm, 1], below)
+                along = np.interp(np.abs(laid[below_arm, 0]), np.abs([armhole[0], wrist[0]]), [armhole[1], wrist[1]])
+                target[below_arm, 1] = np.minimum(target[below_arm, 1], along - (armhole[1] - armpits[arm]))
             laid = rigid.step(laid, target)
     # Ways along a mesh are longer than in the cloth, so that lower rings drew the waist down.
     for hung, ring in tops:
@@ -195,17 +193,11 @@ def _kinds(openings: Sequence[Opening], far: FloatArray, up: FloatArray, waist: 
             + sum(abs(apart[i, k] - apart[j, k]) / max(apart[i, k] + apart[j, k], 1e-9) for k in others)
         )
 
-    kinds = [""] * len(openings)
     if len(found) == 5:
         # Two pairs of twins and the neck; the arms are nearer to it.
-        splits = [
-            (single, (rest[0], other), tuple(k for k in rest[1:] if k != other))
-            for single in found
-            for rest in [[k for k in found if k != single]]
-            for other in rest[1:]
-        ]
+        splits = [(k, (a, b), (c, d)) for k, a, b, c, d in permutations(found) if a < b and a < c < d]
 
-        def unlike(split: tuple[int, tuple[int, int], tuple[int, ...]]) -> float:
+        def unlike(split: tuple[int, tuple[int, int], tuple[int, int]]) -> float:
             single, *pairs = split
             return sum(
                 abs(length[i] - length[j]) / length[j] + abs(apart[i, single] - apart[j, single]) for i, j in pairs
@@ -230,9 +222,7 @@ def _kinds(openings: Sequence[Opening], far: FloatArray, up: FloatArray, waist: 
         raise InputError(
             "falls off: the garment has a single opening, and goes around no part of the body; close it by a seam, buttons or ties"
         )
-    for k, kind in named.items():
-        kinds[k] = kind
-    return kinds
+    return [named.get(k, "") for k in range(len(openings))]
 
 
 def _name_limbs(

@@ -10,7 +10,7 @@ import numpy as np
 from warpflat.core import BoolArray, FloatArray, unit
 from warpflat.garment.mannequin.mannequin import Mannequin
 
-__all__ = ["crossings", "limb_lines", "links", "on_arm"]
+__all__ = ["armpit_heights", "crossings", "limb_lines", "links", "on_arm"]
 
 # A limb goes on by so much [m] beyond its end, the face is so far above the neck, and an arm is nowhere thicker than this [m].
 _BEYOND, _FACE, _ARM = 3.0, 0.15, 0.09
@@ -29,6 +29,11 @@ def limb_lines(body: Mannequin) -> dict[str, FloatArray]:
             near, end = (body.line(f"{line} {side}").mean(axis=0) for line in ends)
             found[f"{side} {limb}"] = np.array([chest, near, end, end + _BEYOND * unit(end - near)])
     return found
+
+
+def armpit_heights(body: Mannequin) -> dict[str, float]:
+    """Return by "left arm" and "right arm" the height of the lowest place of its armhole [m]."""
+    return {f"{side} arm": float(body.line(f"armhole {side}")[:, 1].min()) for side in ("left", "right")}
 
 
 def crossings(line: FloatArray, triangles: FloatArray) -> FloatArray:

@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 from scipy.spatial import Delaunay, cKDTree
 
 from warpflat.core import FloatArray, InputError, IntArray, points_at_lengths, polyline_length, unit
@@ -89,9 +90,7 @@ def mesh_pieces(pieces: Mapping[str, Piece], seams: Sequence[Seam], spacing: flo
             for key, edge in edges.items()
             if key not in owner
         }
-        joints = []
-        for number, seam in enumerate(seams):
-            joints.append(_divide(seam, edges, spacing, finer.get(number, 1), stations))
+        joints = [_divide(seam, edges, spacing, finer.get(k, 1), stations) for k, seam in enumerate(seams)]
         meshes, missing = {}, set()
         for name, piece in pieces.items():
             along = {edge.name: stations[name, edge.name] for ring in loops[name] for edge in ring}
@@ -190,8 +189,6 @@ def _mesh(
     fixed: FloatArray,
 ) -> tuple[FlatMesh, set[str]]:
     """Return the mesh of a piece with vertices at fixed points (#N by 2 [m]), and the edges of which a segment is missing in it."""
-    import shapely
-
     points: list[FloatArray] = []
     ids: dict[str, IntArray] = {}
     rings, count = [], 0

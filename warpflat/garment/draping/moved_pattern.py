@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 
 from warpflat.core import FloatArray, IntArray, reflected, turned_left, unit
-from warpflat.flat import Flattening, SpringNetwork, corner_triangles
+from warpflat.flat import Flattening, SpringNetwork, corner_triangles, signed_cell_areas
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.draping.lift import Lift, surface_lift
 from warpflat.garment.draping.sewn_cloth import SewnCloth, pieces_of
@@ -83,13 +83,8 @@ def cell_matrix(blocks: FloatArray, rows: IntArray, columns: IntArray, shape: tu
 def largest_share(cloth: SewnCloth, step: FloatArray) -> float:
     """Return the largest share of a step, of 1, 1/2, 1/4 ..., that leaves every cell enough of its area."""
     corner, _, _ = corner_triangles(cloth.flat_faces)
-
-    def areas(flat: FloatArray) -> FloatArray:
-        a, b = flat[corner[:, 1]] - flat[corner[:, 0]], flat[corner[:, 2]] - flat[corner[:, 0]]
-        return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
-
-    before, share = areas(cloth.flat), 1.0
-    while share > 1e-3 and (areas(cloth.flat + share * step) < _LEAST_AREA * before).any():
+    before, share = signed_cell_areas(corner, cloth.flat), 1.0
+    while share > 1e-3 and (signed_cell_areas(corner, cloth.flat + share * step) < _LEAST_AREA * before).any():
         share *= 0.5
     return share
 

@@ -146,12 +146,7 @@ def _parts(cloth: SewnCloth, chosen: BoolArray) -> list[IntArray]:
     a, b = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
     inside = chosen[a] & chosen[b]
     label = join_labels(len(chosen), a[inside], b[inside])
-    members = np.flatnonzero(chosen).astype(np.int32)
-    if not len(members):
-        return []
-    order = np.argsort(label[members], kind="stable")
-    members = members[order]
-    return np.split(members, np.flatnonzero(np.diff(label[members])) + 1)
+    return [np.flatnonzero(label == part).astype(np.int32) for part in np.unique(label[chosen])]
 
 
 def _line_at(cloth: SewnCloth, vertex: int) -> str:

@@ -207,11 +207,9 @@ def sew_cloth(garment: Garment | Flattening | Sequence[Flattening]) -> SewnCloth
     # Pairs of vertices that are sewn together: along seams, and on the two sides of every cut.
     pairs: list[tuple[IntArray, IntArray]] = []
     for name, piece in pieces.items():
-        origin = piece.vertex_origin
-        first = np.full(len(piece.surface.vertices), -1, dtype=np.int32)
-        first[origin[::-1]] = np.arange(len(origin), dtype=np.int32)[::-1]
         # The sides of a cut have doubled vertices of the surface.
-        pairs.append((rows[name].start + np.arange(len(origin)), rows[name].start + first[origin]))
+        _, first, which = np.unique(piece.vertex_origin, return_index=True, return_inverse=True)
+        pairs.append((rows[name].start + np.arange(len(which)), rows[name].start + first[which]))
     for seam in garment.stitching if isinstance(garment, Garment) else ():
         one, other = (rows[name].start + ids for name, ids in zip(seam.pieces, seam.vertices, strict=True))
         # Sides of other vertices are sewn at their joints.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from shapely import Point, Polygon, contains_xy
@@ -139,40 +140,31 @@ def _cut_at(piece: Piece, line: FloatArray, sewn: Collection[str]) -> Piece:
 
     if np.abs(off(line)).max() > _ON_LINE:
         return piece
-    lengths = [0.0, 0.0]
-    for edge in piece.edges:
-        if edge.name in sewn:
-            middle = 0.5 * (edge.points[1:] + edge.points[:-1])
-            length = segment_lengths(edge.points)
-            for k, side in enumerate((1.0, -1.0)):
-                lengths[k] += float(length[side * off(middle) > 0.0].sum())
-    side = 1.0 if lengths[0] >= lengths[1] else -1.0
+    parts = [edge.points for edge in piece.edges if edge.name in sewn]
+    more = sum(float(segment_lengths(part) @ np.sign(off(0.5 * (part[1:] + part[:-1])))) for part in parts)
+    side = 1.0 if more > -_ON_LINE else -1.0
     edges = list[Edge]()
     for edge in piece.edges:
         height = side * off(edge.points)
         height[np.abs(height) < _ON_LINE] = 0.0
-        points = list[FloatArray]()
-        for k, point in enumerate(edge.points):
-            if k and height[k - 1] * height[k] < 0.0:
-                share = height[k - 1] / (height[k - 1] - height[k])
-                points.append(edge.points[k - 1] + share * (point - edge.points[k - 1]))
-            if height[k] >= 0.0:
-                points.append(point)
+        k = np.flatnonzero(height[:-1] * height[1:] < 0.0)
+        share = height[k] / (height[k] - height[k + 1])
+        met = edge.points[k] + share[:, None] * (edge.points[k + 1] - edge.points[k])
+        points = np.insert(edge.points, k + 1, met, axis=0)[np.insert(height, k + 1, 0.0) >= 0.0]
         if len(points) > 1 and height.max() > 0.0:
-            edges.append(edge if height.min() >= 0.0 else replace(edge, points=np.array(points), vertices=None))
+            edges.append(edge if height.min() >= 0.0 else replace(edge, points=points, vertices=None))
     # The fold closes the one gap that is left.
-    gaps = [
-        k
-        for k in range(len(edges))
-        if np.linalg.norm(edges[k].points[-1] - edges[(k + 1) % len(edges)].points[0]) > _ON_LINE
-    ]
+    ends = [np.array([one.points[-1], other.points[0]]) for one, other in pairwise([*edges, *edges[:1]])]
+    gaps = [k for k, (end, begin) in enumerate(ends) if np.linalg.norm(end - begin) > _ON_LINE]
     if len(gaps) != 1:
         return piece
-    at = gaps[0]
-    fold = np.array([edges[at].points[-1], edges[(at + 1) % len(edges)].points[0]])
-    edges.insert(at + 1, Edge(name=_FOLD, points=fold, kind="cut"))
-    inside = {name: line for name, line in piece.internal_lines.items() if (side * off(line) > -_ON_LINE).all()}
-    inside = {name: line for name, line in inside.items() if np.abs(off(line)).max() > _ON_LINE}
+    edges.insert(gaps[0] + 1, Edge(name=_FOLD, points=ends[gaps[0]], kind="cut"))
+    heights = {name: side * off(line) for name, line in piece.internal_lines.items()}
+    inside = {
+        name: piece.internal_lines[name]
+        for name, height in heights.items()
+        if height.min() > -_ON_LINE and height.max() > _ON_LINE
+    }
     names = {edge.name for edge in edges}
     return replace(
         piece, edges=edges, internal_lines=inside,
