@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from warpflat.core.text import LONGEST_LINE, LONGEST_WORD, one_line
+import pytest
+
+from warpflat.core.text import LONGEST_LINE, LONGEST_WORD, line_name, one_line
 
 
 def test_a_long_word_and_a_long_line_lose_their_middle() -> None:
@@ -15,3 +17,10 @@ def test_a_long_word_and_a_long_line_lose_their_middle() -> None:
 
 def test_lines_are_joined_and_control_characters_escaped() -> None:
     assert one_line("one\n  two\x1b[31m") == r"one two\x1b[31m"
+
+
+@pytest.mark.parametrize(
+    ("name", "line"), [("neck left 2", "neck"), ("waist 2 3", "waist"), ("gore_2", "gore"), ("panel2 left", "panel2")]
+)
+def test_a_number_that_is_a_word_of_its_own_is_no_part_of_a_line_name(name: str, line: str):
+    assert line_name(name) == line

@@ -19,6 +19,7 @@ __all__ = [
     "plain_letters",
     "quote_value",
     "size_words",
+    "unnumbered",
     "without_side",
 ]
 
@@ -58,7 +59,12 @@ def without_side(name: str) -> str:
 
 def line_name(name: str) -> str:
     """Return what the line of an edge is called, without side and number: the neck of "neck left 2"."""
-    return without_side(name).rstrip(" 0123456789")
+    return unnumbered(without_side(name))
+
+
+def unnumbered(name: str) -> str:
+    """Return a name without its number, which tells it from others of its kind: the waist of "waist 2"."""
+    return re.sub(r"( \d+)+$", "", name)
 
 
 def other_side(name: str) -> str:

@@ -13,7 +13,7 @@ from warpflat.app.scene.cuts import asked_cuts, cut_of_dart, place_of
 from warpflat.app.scene.plan import GarmentPlan
 from warpflat.app.studio.cut_tables import rounded
 from warpflat.app.studio.solve import Solution
-from warpflat.core import FloatArray, arc_lengths, unit
+from warpflat.core import FloatArray, arc_lengths, unit, unnumbered
 from warpflat.flat import Crack, border_of, seam_kind, triangulate
 from warpflat.garment import FormDart, Mesh, Neckline, PlacedDart, dart_part, select_bricks
 
@@ -178,7 +178,7 @@ def _of_sides(solution: Solution, plan: GarmentPlan, name: str, flat: FloatArray
                 along = unit(flat[ids[after]] - flat[ids[before]])
                 # Edges run counter-clockwise, so that what is outside lies to their right.
                 yield _slid(
-                    f"{edge.rstrip(' 0123456789')} at the {level}", name, flat[ids[at[0]]], np.array([along[1], -along[0]]),
+                    f"{unnumbered(edge)} at the {level}", name, flat[ids[at[0]]], np.array([along[1], -along[0]]),
                     partial(change, level, ease, share),
                 )  # fmt: skip
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice, pairwise, product
 
 import numpy as np
 
-from warpflat.core import FloatArray, arc_lengths, points_at_lengths, without_side
+from warpflat.core import FloatArray, arc_lengths, line_name, points_at_lengths
 from warpflat.garment.construction.edges import SAME_LINE
 from warpflat.pattern import Pattern, Piece, Seam, SeamSide
 
@@ -141,7 +140,7 @@ def draw_equal_pieces_once(pattern: Pattern, called: str = "") -> tuple[Pattern,
 
 def _stem(piece: Piece) -> tuple[str, str, str, int]:
     """Return what equal pieces have in common beside their outlines."""
-    return re.sub(r"[ _]\d+$", "", without_side(piece.name)), piece.role, piece.fabric, piece.quantity
+    return line_name(piece.name), piece.role, piece.fabric, piece.quantity
 
 
 def _laid_on(piece: Piece, head: Piece, *, turned: bool | None = None) -> list[Copy]:

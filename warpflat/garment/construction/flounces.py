@@ -8,7 +8,7 @@ from itertools import groupby, pairwise
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError
+from warpflat.core import FloatArray, InputError, unnumbered
 from warpflat.garment.construction.edges import (
     beside,
     free_piece_name,
@@ -108,7 +108,7 @@ def _with_panel(
     sample = pattern.piece(name, pattern.sample)
     neighbours = beside(sample, *(side.edge for side in own))
     # Named as what runs on beyond it, without number.
-    words = [each.rstrip(" 0123456789") for each in neighbours]
+    words = [unnumbered(each) for each in neighbours]
     ends = (words[0], words[1] if words[1] != words[0] else f"{words[1]} 2")
     folded = [sample.edge(each).kind == "fold" for each in neighbours]
     whole, row = (2.0 if any(folded) else 1.0), FreeChain(sides=tuple(own), closed=False)

@@ -7,7 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core import FloatArray, find_unused_name, other_side, points_at_lengths, polyline_length, without_side
+from warpflat.core import (
+    FloatArray,
+    find_unused_name,
+    other_side,
+    points_at_lengths,
+    polyline_length,
+    unnumbered,
+    without_side,
+)
 from warpflat.garment.construction.edges import (
     SAME_PIECE,
     Place,
@@ -217,7 +225,7 @@ def marks_of(pattern: Pattern, chain: FreeChain, size: str, line: str) -> list[f
     found, before = list[float](), 0.0
     for side in chain.sides:
         known = lines_of(pattern.piece(side.piece, size)).items()
-        lines = {name: each for name, each in known if name.rstrip(" 0123456789") == line and name != side.edge}
+        lines = {name: each for name, each in known if unnumbered(name) == line and name != side.edge}
         points = side_points(pattern, side, size)
         for at in (before + at for _, at in lines_ending_on(points, lines)):
             if all(abs(at - other) > OFF_END for other in found):

@@ -9,7 +9,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, InputError, nearest, start_warp, without_side
+from warpflat.core import BoolArray, InputError, nearest, start_warp, unnumbered, without_side
 from warpflat.flat import Flattening, Surface
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.garment import Garment
@@ -130,7 +130,7 @@ def thread_elastics(cloth: SewnCloth, edges: Sequence[str], body: Body) -> tuple
         edges: what an elastic is threaded through, on whatever piece and side.
         body: what it draws them to.
     """
-    called = {line: line.partition(".")[2].removesuffix(MIRRORED).rstrip(" 0123456789") for line in cloth.lines}
+    called = {line: unnumbered(line.partition(".")[2].removesuffix(MIRRORED)) for line in cloth.lines}
     gripped = [line for line, edge in called.items() if {edge, without_side(edge)} & set(edges)]
     drawn = cloth.designed.copy()
     if gripped:

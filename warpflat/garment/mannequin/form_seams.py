@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core import IntArray
+from warpflat.core import IntArray, unnumbered
 from warpflat.garment.mannequin.pieces import FormPiece
 from warpflat.garment.mannequin.seam_names import name_seams
 
@@ -64,7 +63,7 @@ def find_seams(pieces: Mapping[str, FormPiece]) -> tuple[FormSeam, ...]:
         found.setdefault((names[0], names[1], whole[0], whole[1]), []).append(run)
     rows = [(sides, tuple(chain)) for sides, runs in found.items() for chain in _chains(pieces[sides[0]], runs)]
     called = name_seams(
-        [re.sub(r" \d+$", "", edge) for (_, _, edge, _), _ in rows],
+        [unnumbered(edge) for (_, _, edge, _), _ in rows],
         [(first, second) for (first, second, _, _), _ in rows],
         [pieces[first].surface.vertices[np.concatenate([run.vertices[0] for run in chain])]
          for (first, _, _, _), chain in rows],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from warpflat.core import InputError
+from warpflat.core import InputError, unnumbered
 from warpflat.pattern.drafting.pieces import Seam, SeamSide
 
 __all__ = ["joint_words", "seam_words", "seams_of_words"]
@@ -17,8 +17,7 @@ _WORDS = re.compile(r"\A(.+) \| side ([12]) part (\d+) \| ([^|]+?)(?: \| ease (\
 def joint_words(seam: Seam) -> str:
     """Return what sewers call a seam: "crown to side front", by the pieces of both sides, without their numbers."""
     first, second = (
-        " + ".join(dict.fromkeys(re.sub(r" \d+$", "", side.piece.replace("_", " ")) for side in row))
-        for row in seam.sides
+        " + ".join(dict.fromkeys(unnumbered(side.piece.replace("_", " ")) for side in row)) for row in seam.sides
     )
     return f"{first} to {second}" if first != second else f"seam of the {first}"
 

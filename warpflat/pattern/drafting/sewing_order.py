@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core import other_side, without_side
+from warpflat.core import other_side, unnumbered, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.pieces import Seam, SeamOpening, SeamSide
@@ -401,7 +401,7 @@ class _Workshop(SewingTasks):
         self.letters |= {each.name: letter for each in group}
         # Seams called by their pieces have numbers from the second on; those of facings, and of equal pieces between others, are said
         # by theirs, too.
-        by_pieces = re.sub(r" \d+$", "", seam.name) == joint_words(seam) or task.technique == "facing_join"
+        by_pieces = unnumbered(seam.name) == joint_words(seam) or task.technique == "facing_join"
         copied = any(part.copy for each in group for part in each.stretches)
         equal = copied and len({part.piece for each in group for part in each.stretches}) > 2
         by_pieces = by_pieces or equal
