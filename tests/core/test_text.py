@@ -20,7 +20,14 @@ def test_lines_are_joined_and_control_characters_escaped() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "line"), [("neck left 2", "neck"), ("waist 2 3", "waist"), ("gore_2", "gore"), ("panel2 left", "panel2")]
+    ("name", "line"),
+    [
+        ("neck left 2", "neck"),
+        ("waist 2 3", "waist"),
+        ("gore_2", "gore"),
+        ("panel2 left", "panel2"),
+        ("right.1", "right"),
+    ],
 )
 def test_a_number_that_is_a_word_of_its_own_is_no_part_of_a_line_name(name: str, line: str):
     assert line_name(name) == line

@@ -63,8 +63,8 @@ def line_name(name: str) -> str:
 
 
 def unnumbered(name: str) -> str:
-    """Return a name without its number, which tells it from others of its kind: the waist of "waist 2"."""
-    return re.sub(r"( \d+)+$", "", name)
+    """Return a name without its number, which tells it from others of its kind: the waist of "waist 2", the side of "side.1"."""
+    return re.sub(r"([ .]\d+)+$", "", name)
 
 
 def other_side(name: str) -> str:
