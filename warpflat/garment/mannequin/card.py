@@ -8,6 +8,7 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpflat.core import FloatArray, IntArray, unit
 from warpflat.garment.mannequin.body_landmarks import ARM_PLACES, model_places, near_level, near_place, value_at
@@ -182,9 +183,9 @@ def _with_ends(mannequin: Mannequin) -> tuple[FloatArray, IntArray, dict[str, Fl
 
     head, tall = head_of(mannequin), mannequin.lengths["stature"]
     assert head is not None, "every size table has a head"
-    sideways = np.array([1.0, 0.0, 0.0])
+    places, triangles, sideways = model_places(), finer_body()[1].astype(np.int32), np.array([1.0, 0.0, 0.0])
+    ends: list[tuple[str, FloatArray, IntArray, NDArray[np.int64], FloatArray]]
     ends = [("head", *head, np.arange(len(head[0])), sideways)]
-    places, triangles = model_places(), finer_body()[1]
     for side in ("right", "left"):
         elbow, wrist = (value_at(near_place(ARM_PLACES[name], side), places.mean) for name in ("elbow", "wrist"))
         along = mannequin.line(f"wrist {side}").mean(axis=0) - mannequin.line(f"elbow {side}").mean(axis=0)
