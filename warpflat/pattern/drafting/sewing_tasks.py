@@ -494,6 +494,7 @@ def _mirror_groups(seams: Sequence[Seam], pieces: Mapping[str, Piece]) -> list[l
     images: dict[object, object] = {}
     for seam in seams:
         # Edges of equal pieces, of which one is drawn, have the notches of one seam.
+        key: object
         own = [s.place for s in seam.stretches if s.place in copied]
         if own:
             key = next((alike[edge] for edge in own if edge in alike), own[0])
@@ -502,25 +503,23 @@ def _mirror_groups(seams: Sequence[Seam], pieces: Mapping[str, Piece]) -> list[l
             continue
         sides = sorted(tuple(sorted((without_side(s.piece), line_name(s.edge)) for s in side)) for side in seam.sides)
         # A zip in one side alone makes it another seam than the other side. Parts of an edge are numbered around the piece.
-        key: object = (without_side(seam.name), tuple(sides), seam.openings)
+        key = without_side(seam.name), tuple(sides), seam.openings
         if any(pieces[side.piece].is_pair for side in seam.stretches):
             # Whatever its name, the seam of the copies that are turned over is the mirror image, at the other sides of other pieces.
+            image = [[_mirror_image(side, pieces[side.piece]) for side in row] for row in seam.sides]
             here, there = (
-                frozenset(
-                    frozenset(
-                        (s.piece, s.edge, s.mirrored != turned)
-                        if pieces[s.piece].is_pair
-                        else (s.piece, other_side(s.edge) if turned else s.edge, s.mirrored)
-                        for s in row
-                    )
-                    for row in seam.sides
-                )
-                for turned in (False, True)
+                frozenset(frozenset((side.place, side.mirrored) for side in row) for row in rows)
+                for rows in (seam.sides, image)
             )
             key = images.setdefault((here, seam.openings), key)
             images[there, seam.openings] = key
         groups.setdefault(key, []).append(seam)
     return list(groups.values())
+
+
+def _mirror_image(side: SeamSide, piece: Piece) -> SeamSide:
+    """Return the stretch of the mirrored seam: of a pair the copy that is turned over, else the edge of the other side."""
+    return replace(side, mirrored=not side.mirrored) if piece.is_pair else replace(side, edge=other_side(side.edge))
 
 
 def _buttons_at_one_end(piece: DraftedPiece) -> bool:
