@@ -20,9 +20,6 @@ from warpflat.pattern.drafting.words import as_sentence, translate
 if TYPE_CHECKING:
     from reportlab.pdfbase.ttfonts import TTFont
 
-    from warpflat.pattern.drafting.drafted import DraftedEdge
-    from warpflat.pattern.drafting.piece_parts import Edge
-
 __all__ = [
     "BOLD",
     "CAPITALS",
@@ -176,7 +173,7 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
         f"{cutting_words(replace(piece, quantity=count, also={}))} - {cloth}" for cloth, count in piece.also.items()
     ]
     allowances = []
-    for kind, values in allowances_of(piece.edges, piece.units).items():
+    for kind, values in allowances_of(((edge.kind, edge.width) for edge in piece.edges), piece.units).items():
         if values:
             # The unit once: "6/10 mm".
             numbers = [value.removesuffix(f" {piece.units}") for value in values]
@@ -190,15 +187,15 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def allowances_of(edges: Iterable[Edge | DraftedEdge], units: str) -> dict[str, list[str]]:
-    """Return the different allowances of seams and of hems among some edges, in words.
+def allowances_of(edges: Iterable[tuple[str, float]], units: str) -> dict[str, list[str]]:
+    """Return the different allowances of seams and of hems among edges, of which each gives its kind and its width [m], in words.
 
     The legs of a dart that is cut away are sewn as a seam, and what is turned in has as much.
     """
     widths: dict[str, set[float]] = {"seam": set(), "hem": set()}
-    for edge in edges:
-        if edge.kind in ("seam", "hem", "dart", "cut") and edge.width > 0:
-            widths["hem" if edge.kind == "hem" else "seam"].add(round(edge.width, 4))
+    for kind, width in edges:
+        if kind in ("seam", "hem", "dart", "cut") and width > 0:
+            widths["hem" if kind == "hem" else "seam"].add(round(width, 4))
     return {kind: [length_words(width, units) for width in sorted(row)] for kind, row in widths.items()}
 
 

@@ -140,9 +140,10 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     page.paragraph(tools(whole, steps), indent=0.030, lead=translate("Tools"))
     _cloth(page, whole)
     _pieces_to_cut(page, pieces)
+    edges = ((edge.kind, edge.width) for piece in pieces for edge in piece.edges)
     allowances = [
         translate(f"{kind}s {{width}}", width=listed(widths))
-        for kind, widths in allowances_of((edge for piece in pieces for edge in piece.edges), pattern.units).items()
+        for kind, widths in allowances_of(edges, pattern.units).items()
         if widths
     ]
     told = "Allowances are included: {allowances}." if allowances else "No allowances are included."
