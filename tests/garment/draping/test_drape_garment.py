@@ -287,6 +287,8 @@ def test_what_cannot_be_draped_is_refused(bodice: warpflat.Garment):
         warpflat.drape([])
     with pytest.raises(InputError, match="friction = -1"):
         warpflat.DrapeOptions(friction=-1.0)
+    with pytest.raises(InputError, match=r"max_steps = 5000\.0; must be a whole number"):
+        warpflat.DrapeOptions(max_steps=5e3)
 
 
 def test_a_scene_with_a_drape_reports_it(tmp_path: Path):

@@ -17,6 +17,7 @@ from urllib.parse import quote
 
 from warpflat.app.review.faults import faults_of
 from warpflat.app.review.film import open_film, pack_film, pack_foreign_film
+from warpflat.app.review.totals import count_pieces
 from warpflat.core import (
     InputError,
     atomic_path,
@@ -277,7 +278,7 @@ def _film(packed: Mapping[str, Any]) -> str:
 def _cards(metrics: Mapping[str, Any]) -> str:
     """Return what one looks for first as HTML: energy, errors, cloth, pieces and fabric."""
     pieces = metrics["pieces"].values()
-    area = sum(piece["area_m2"] for piece in pieces)
+    area, count = sum(piece["area_m2"] for piece in pieces), count_pieces(metrics)
     fits = [piece["wear"] for piece in pieces if piece.get("wear")]
     stretch = max((each[f"strain_{way}"]["p95"] for each in fits for way in ("warp", "weft")), default=0.0)
     if stretch > STRETCHED and metrics.get("verdict", {}).get("fits"):
@@ -292,8 +293,8 @@ def _cards(metrics: Mapping[str, Any]) -> str:
     cards = [
         (energy_words(sum(piece["strain_energy_j"] for piece in pieces)), "strain energy"),
         *differs,
-        (f"{area:.3g} m²", "cloth"),
-        (str(len(metrics["pieces"])), "piece" if len(metrics["pieces"]) == 1 else "pieces"),
+        (f"{area:.3g} m²", "laid out"),
+        (str(count), "pattern piece" if count == 1 else "pattern pieces"),
         (", ".join(sorted({piece["fabric"] for piece in pieces})), "fabric"),
     ]
     if metrics.get("seams"):

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.app.review.faults import is_done
+from warpflat.app.review.totals import count_pieces
 from warpflat.app.scene.load import make_scene, scene_fabric
 from warpflat.app.scene.options import COMMAND_LINE, errors_of_options
 from warpflat.core import (
@@ -494,7 +495,7 @@ class Fitted:
             "body": self.carried.body,
             **{f"ease_{level}_mm": eases.get(level) for level in EASE_LEVELS},
             "kept": self.carried.kept()[1],
-            "pieces": len(pieces),
+            "pieces": count_pieces(self.metrics),
             "area_m2": area,
             "fits": self.fits,
             "done": is_done(self.metrics),
