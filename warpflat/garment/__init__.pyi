@@ -76,6 +76,7 @@ from .draping.picture import write_correction_picture as write_correction_pictur
 from .draping.recover_pattern import Recovery as Recovery
 from .draping.recover_pattern import recover_pattern as recover_pattern
 from .draping.result import Drape as Drape
+from .draping.write import files_of_drape as files_of_drape
 from .draping.write import save_drape as save_drape
 from .draping.write import write_drape_files as write_drape_files
 from .mannequin.body_model import finer_body as finer_body
