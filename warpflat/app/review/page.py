@@ -173,7 +173,9 @@ def _page(
     }
     images = []
     for file in sorted(shown, key=lambda file: (_FIRST.index(file) if file in _FIRST else len(_FIRST), file)):
-        words = shows.get(file, file.removesuffix(".png").replace("_", " ").replace(".", " "))
+        # Of a mesh it begins with the name of its piece.
+        kind = "wear.png" if file.endswith(".wear.png") else file
+        words = shows.get(kind, file.removesuffix(".png").replace("_", " ").replace(".", " "))
         images.append(_thumbnail(escape(words), shown[file]))
     drawings = []
     for file in sorted(file for file in files if file.endswith(".svg")):
