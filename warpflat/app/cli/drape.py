@@ -89,7 +89,7 @@ def drape(
         if edges:
             lines, notes = edge_table(scene, sewing=seams, units=units)
             for note in notes:
-                tell(note)
+                tell(f"note: {note}")
             click.echo("\n".join(lines))
             return DONE
         start_warp_silently()
@@ -101,7 +101,7 @@ def drape(
         )  # fmt: skip
         warnings = faults_of(result.metrics)
         # What was left out has a line of its own at the end.
-        left = [note for note in result.notes if note not in result.metrics.get("notes", ())]
+        left = [f"note: {note}" for note in result.notes if note not in result.metrics.get("notes", ())]
         for line in (*(left if output.tells else ()), *warnings):
             tell(line)
         output.report(

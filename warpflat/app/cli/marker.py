@@ -143,6 +143,6 @@ def marker(
         click.echo(json.dumps({"schema": 1, "markers": plans}))
     elif not quiet:
         for note in notes:
-            tell(note)
+            tell(f"note: {note}")
         click.echo(f"{files[0].parent}: {', '.join(file.name for file in files)}")
     return FAULTY if any("not_made" in plan for plan in plans) else DONE

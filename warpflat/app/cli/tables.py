@@ -87,7 +87,7 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
                 _price(seam["released_j"]) or seam["needed"] or "not tried",
                 ""
                 if seam["released_j"] is None
-                else f"{10 * seam['released_j'] / max(seam['length_m'], 1e-9):.3g} mJ/cm",
+                else f"{energy_words(seam['released_j'] / max(100 * seam['length_m'], 1e-9))}/cm",
             )
             for seam in found
         ]
@@ -220,7 +220,7 @@ def edit_table(edit: Mapping[str, Any]) -> str:
     """Return energies, strain and darts of a garment before and after an edit as text."""
     before, after = edit["before"], edit["after"]
     rows = [
-        (f"{words} energy", *(f"{1e3 * each[f'{words}_energy_j']:.4g} mJ" for each in (before, after)))
+        (f"{words} energy", *(energy_words(each[f"{words}_energy_j"]) for each in (before, after)))
         for words in ("strain", "model")
     ]
     rows.append(("beyond the limit", *(f"{100 * each['outside']:.1f} %" for each in (before, after))))
