@@ -123,6 +123,7 @@ from .mannequin.shapes import shaped_form as shaped_form
 from .mannequin.table import MannequinTable as MannequinTable
 from .mannequin.table import mannequin_from_table as mannequin_from_table
 from .mannequin.usd import write_mannequin_usd as write_mannequin_usd
+from .seams.by_hand import plane_curves as plane_curves
 from .seams.find import GRAIN as GRAIN
 from .seams.find import FoundSeams as FoundSeams
 from .seams.find import find_seams as find_seams

@@ -273,6 +273,11 @@ def test_a_garment_ends_as_its_wearer_sits_where_the_pose_is_kept(command: Comma
     line = np.array(there["line"])
     assert np.linalg.norm(cloth.closest(line)[2] - line, axis=1).max() < 1e-4
     assert np.ptp(line[:, 1]) > 0.02
+    # An upright plane meets front and back, and cuts but the nearest if asked to.
+    upright = {"point": [0.0, middle, 1.0], "normal": [1.0, 0.0, 0.0]}
+    assert len(job.carry_cuts(sits, [{"plane": upright}])) == 2
+    (front,) = job.carry_cuts(sits, [{"plane": {**upright, "nearest": True}}])
+    assert np.array(front["line"])[:, 2].mean() > sits.vertices[:, 2].mean()
     (drawn,) = job.carry_cuts(sits, [{"points": same["line"][:2]}])
     np.testing.assert_allclose(drawn["points"], there["line"][:2], atol=1e-9)
     with pytest.raises(InputError, match="the plane misses the garment"):

@@ -16,8 +16,8 @@ from typing import Any
 from urllib.parse import quote
 
 from warpflat.app.review.faults import faults_of
+from warpflat.app.review.figures import count_pieces, seam_figures
 from warpflat.app.review.film import open_film, pack_film, pack_foreign_film
-from warpflat.app.review.totals import count_pieces
 from warpflat.core import (
     InputError,
     atomic_path,
@@ -173,7 +173,9 @@ def _page(
     }
     images = []
     for file in sorted(shown, key=lambda file: (_FIRST.index(file) if file in _FIRST else len(_FIRST), file)):
-        words = shows.get(file, file.removesuffix(".png").replace("_", " ").replace(".", " "))
+        # Of a mesh it begins with the name of its piece.
+        kind = "wear.png" if file.endswith(".wear.png") else file
+        words = shows.get(kind, file.removesuffix(".png").replace("_", " ").replace(".", " "))
         images.append(_thumbnail(escape(words), shown[file]))
     drawings = []
     for file in sorted(file for file in files if file.endswith(".svg")):
@@ -404,18 +406,8 @@ def ledger_table(metrics: Metrics) -> str:
 
 def seam_table(metrics: Metrics) -> str:
     """Return every seam with its two lengths; empty if there is none."""
-    rows = [
-        (
-            seam["name"],
-            " + ".join(seam["sides"]),
-            f"{seam['length_mm'][0]:.1f} mm",
-            f"{seam['length_mm'][1]:.1f} mm",
-            f"{seam['difference_mm']:+.3f} mm",
-            f"{100 * seam['ease']:.1f} %",
-        )
-        for seam in metrics.get("seams") or ()
-    ]
-    return _table(("seam", "edges", "first", "second", "difference", "ease"), rows, text=2)
+    rows = [(seam["name"], " = ".join(seam["sides"]), *seam_figures(seam)) for seam in metrics.get("seams") or ()]
+    return _table(("seam", "sides", "first", "second", "ease", "difference"), rows, text=2)
 
 
 def size_table(metrics: Metrics) -> str:
