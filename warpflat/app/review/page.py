@@ -342,7 +342,7 @@ def _typeset(words: str) -> str:
 
 
 def ease_table(metrics: Mapping[str, Any]) -> str:
-    """Return the girths of body and garment; empty where it goes around no body."""
+    """Return the girths of body and pattern; empty where it goes around no body."""
     rows = [
         (
             level,
@@ -353,7 +353,8 @@ def ease_table(metrics: Mapping[str, Any]) -> str:
         )
         for level, girth in (metrics.get("girths") or {}).items()
     ]
-    return _table(("level", "body", "garment", "ease", "asked for"), rows)
+    told = "<p>The pieces that were flattened, with darts and seams closed; cuffs and bands are not in it.</p>"
+    return _table(("level", "body", "pattern", "ease", "asked for"), rows) + (told if rows else "")
 
 
 def _bytes(path: Path) -> bytes:
