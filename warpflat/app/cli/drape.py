@@ -25,6 +25,9 @@ _FILES = """\b
   NAME.draped.obj  each piece as it is worn [m], with the pattern [m] as texture coordinates
   drape.png        gap, strain and shear from the front, the side and the back
   drape.webp       how the cloth comes to rest
+  worn.usdc        with --usd: the worn garment as one mesh
+  corrected.png, NAME.corrected.dxf, NAME.corrected.svg
+                   with --correct: the outlines before and after, and the corrected pattern
 Of a pattern these, frames.usdc and metrics.json come out alone."""
 
 

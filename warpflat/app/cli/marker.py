@@ -16,6 +16,9 @@ _EPILOG = """\b
 What comes out, in DIR:
   NAME.marker.svg   the lay in true size: pieces, grain and names on the cloth
   NAME.marker.json  its width and length [m], the share that is used, and where each piece lies
+  NAME.CLOTH.marker.svg, NAME.CLOTH.marker.json
+                    the same of every further cloth
+  metrics.json      in a folder that holds no run: what was written
 
 \b
 Exit codes:

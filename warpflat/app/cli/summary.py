@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from warpflat.app.cli.tables import cut_words
-from warpflat.app.review.totals import count_pieces
+from warpflat.app.review.figures import count_pieces
 from warpflat.core import energy_words, format_count
 from warpflat.garment import LACKING, NO_PATTERN
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
+from warpflat.app.review.figures import seam_figures
 from warpflat.core import aligned, energy_words
 from warpflat.flat import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_names
 
@@ -64,17 +65,9 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
     if relaxed := relaxation_words(piece["stages"] for piece in metrics["pieces"].values()):
         tables.append(f"relaxed: {relaxed}")
     if metrics.get("seams"):
-        columns = ("seam", "sides", "mm", "mm", "ease", "difference", "price")
+        columns = ("seam", "sides", "first", "second", "ease", "difference", "price")
         seams = [
-            (
-                seam["name"],
-                " = ".join(seam["sides"]),
-                *(f"{length:.1f}" for length in seam["length_mm"]),
-                f"{100 * seam['ease']:+.3g} %" if seam["ease"] else "",
-                # Without the sign of a negative zero.
-                f"{round(seam['difference_mm'], 2) + 0.0:+.2f} mm",
-                _price(seam["price_j"]),
-            )
+            (seam["name"], " = ".join(seam["sides"]), *seam_figures(seam), _price(seam["price_j"]))
             for seam in metrics["seams"]
         ]
         tables.append(aligned(columns, seams, left=(0, 1)))

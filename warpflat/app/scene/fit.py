@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.app.review.faults import is_done
-from warpflat.app.review.totals import count_pieces
+from warpflat.app.review.figures import count_pieces
 from warpflat.app.scene.load import errors_named, make_scene, scene_fabric
 from warpflat.app.scene.options import COMMAND_LINE, errors_of_options
 from warpflat.core import (
