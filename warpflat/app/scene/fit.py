@@ -29,7 +29,8 @@ from warpflat.core import (
     nearest,
     quote_value,
 )
-from warpflat.garment import EASE_LEVELS
+from warpflat.flat import METRES_PER_UNIT
+from warpflat.garment import EASE_LEVELS, EASE_RANGE
 
 if TYPE_CHECKING:
     from warpflat.app.scene.run import SceneResult
@@ -58,11 +59,8 @@ _KEPT = 0.01
 _WITHIN, _TOLD = 0.002, 0.01
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,2})?"
 _LENGTH = re.compile(rf"\s*(?P<level>[a-z]+)\s*=\s*(?P<value>{_NUMBER})\s*(?P<unit>mm|cm|m|in)\s*", re.ASCII)
-_UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 # A texture that may be a normalised one is a pattern where so much of the worn cloth at most is stretched against it, in nine of ten cells.
 _AS_WORN = 0.1
-# Ease is from and to these [m].
-_RANGE = -0.3, 4.0
 #: Axes of a garment's front, and how it is turned to face +Z.
 _FRONTS = {"+z": (1.0, 0.0), "-z": (-1.0, 0.0), "+x": (0.0, 1.0), "-x": (0.0, -1.0)}
 
@@ -376,9 +374,9 @@ def ease_wishes(texts: Sequence[str]) -> dict[str, float]:
             raise InputError(f"--ease {quote_value(text)}: give a level and a length with its unit, as waist=40mm")
         if match["level"] not in EASE_LEVELS:
             raise InputError(f"--ease {quote_value(text)}: level {nearest(match['level'], EASE_LEVELS)}")
-        value = float(match["value"]) * _UNITS[match["unit"]]
-        if not _RANGE[0] <= value <= _RANGE[1]:
-            raise InputError(f"--ease {quote_value(text)}: ease is from -30 to 400 cm")
+        value = float(match["value"]) * METRES_PER_UNIT[match["unit"]]
+        if not EASE_RANGE[0] <= 100.0 * value <= EASE_RANGE[1]:
+            raise InputError(f"--ease {quote_value(text)}: ease is from {EASE_RANGE[0]:g} to {EASE_RANGE[1]:g} cm")
         if match["level"] in found:
             raise InputError(f"--ease: {match['level']} is given twice; give it once")
         found[match["level"]] = value
@@ -423,7 +421,6 @@ def fit_to(
     """
     from warpflat.app.scene.run import files_of_run, run_scene
     from warpflat.core import output_folder, record_file
-    from warpflat.flat import METRES_PER_UNIT
     from warpflat.garment import finer_body, graded_layout, with_cuts
 
     known, raw = job.panels if job.keeps_pattern(tables) else [], job.read.raw
