@@ -9,7 +9,6 @@ from .drafting.fairing import fair_line as fair_line
 from .drafting.fairing import fairest_line as fairest_line
 from .drafting.fitting import drawn_length as drawn_length
 from .drafting.from_mesh import MeshFeatures as MeshFeatures
-from .drafting.from_mesh import inner_stretches as inner_stretches
 from .drafting.from_mesh import line_labels as line_labels
 from .drafting.from_mesh import piece_from_mesh as piece_from_mesh
 from .drafting.marker import Cloth as Cloth

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from warpflat.core.arrays import IntArray
+from warpflat.core.vectors import unit
 from warpflat.flat.surface.connectivity import border_loops
 from warpflat.flat.surface.half_edges import half_edges_of
 from warpflat.flat.surface.mesh import Surface
@@ -71,8 +72,7 @@ def line_along_band(surface: Surface, line: IntArray) -> IntArray | None:
         at = int(np.flatnonzero(loops[0] == tip)[0])
         for loop in (np.roll(loops[0], -at), np.roll(loops[0][::-1], at + 1)):
             step = np.diff(surface.vertices[np.append(loop, loop[0])], axis=0)
-            size = np.linalg.norm(step, axis=1)
-            ahead = step / np.maximum(size, np.finfo(float).tiny)[:, None]
+            size, ahead = np.linalg.norm(step, axis=1), unit(step)
             corner = np.einsum("ij,ij->i", ahead[:-1], ahead[1:]) < _CORNER
             near = np.flatnonzero(corner & (np.cumsum(size)[:-1] <= 2 * width))
             if len(near):
