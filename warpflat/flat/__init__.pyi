@@ -161,6 +161,7 @@ from .surface.overlap import OVERLAP as OVERLAP
 from .surface.overlap import overlap_width as overlap_width
 from .surface.overlap import overlapping as overlapping
 from .surface.overlap import parted as parted
+from .surface.paths.band import NARROW_BAND as NARROW_BAND
 from .surface.paths.edge_paths import are_joined as are_joined
 from .surface.paths.edge_paths import as_vertex as as_vertex
 from .surface.paths.edge_paths import path_length as path_length

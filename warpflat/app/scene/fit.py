@@ -18,6 +18,7 @@ from warpflat.app.review.faults import is_done
 from warpflat.app.review.figures import count_pieces
 from warpflat.app.scene.load import errors_named, make_scene, scene_fabric
 from warpflat.app.scene.options import COMMAND_LINE, errors_of_options
+from warpflat.app.scene.outside_pattern import BESIDE
 from warpflat.core import (
     FloatArray,
     InputError,
@@ -51,8 +52,6 @@ __all__ = [
 
 #: What a study leaves, the table of several bodies last.
 STUDY_FILES = ("fit.json", "fit.csv")
-# A garment lies on its body if half of its cloth is nearer than this [m].
-_BESIDE = 0.2
 # Ease is kept if it is by this [m] what it was, or what was asked.
 _KEPT = 0.01
 # Cloth that lies so deep in the body [m] is within it; more than this share of it is told.
@@ -202,7 +201,7 @@ class FitJob:
                 )
         cloth = np.concatenate([vertices for vertices, _ in layers])
         far = np.linalg.norm(worn.skin.closest(cloth)[2] - cloth, axis=1)
-        if np.median(far) > _BESIDE:
+        if np.median(far) > BESIDE:
             raise InputError(
                 f"{path}: half of it lies more than {100 * np.median(far):.0f} cm off {body or 'any body inside it'}; give the body on "
                 "which it was made, in the same axes and place, its unit with --units, or leave --from out"
