@@ -81,6 +81,7 @@ from .model.network import SpringNetwork as SpringNetwork
 from .model.springs import SpringArrays as SpringArrays
 from .model.springs import SpringsAround as SpringsAround
 from .model.springs import springs_of as springs_of
+from .model.springs import stretch_factor as stretch_factor
 from .model.springs import with_stiffness as with_stiffness
 from .model.strain import WornStrain as WornStrain
 from .model.strain import shear_angles as shear_angles

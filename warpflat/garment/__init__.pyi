@@ -76,6 +76,7 @@ from .draping.picture import write_correction_picture as write_correction_pictur
 from .draping.recover_pattern import Recovery as Recovery
 from .draping.recover_pattern import recover_pattern as recover_pattern
 from .draping.result import Drape as Drape
+from .draping.write import files_of_drape as files_of_drape
 from .draping.write import save_drape as save_drape
 from .draping.write import write_drape_files as write_drape_files
 from .mannequin.body_model import finer_body as finer_body
@@ -122,6 +123,7 @@ from .mannequin.shapes import shaped_form as shaped_form
 from .mannequin.table import MannequinTable as MannequinTable
 from .mannequin.table import mannequin_from_table as mannequin_from_table
 from .mannequin.usd import write_mannequin_usd as write_mannequin_usd
+from .seams.by_hand import plane_curves as plane_curves
 from .seams.find import GRAIN as GRAIN
 from .seams.find import FoundSeams as FoundSeams
 from .seams.find import find_seams as find_seams

@@ -46,7 +46,7 @@ def test_flatten_writes_its_files_and_a_summary(command: Command):
     code, out, err, _ = command("flatten", "cloth.obj", "--units", "m", "--fabric", "denim")
     assert code == 0
     assert len(out.splitlines()) <= 5
-    assert out.startswith("fits by its strain\n1 piece, 2.02 m2 laid out in denim, strain energy ")
+    assert out.startswith("fits by its strain\n1 pattern piece, 2.02 m2 laid out in denim, strain energy ")
     assert "; reads as 1 m tall (2 x 1 x 0.2 m)\nprint out/cloth/pattern.pdf\nout/cloth: review.html, " in out
     assert "it/s" not in err
     assert {path.name for path in Path("out/cloth").iterdir()} == {

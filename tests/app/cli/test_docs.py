@@ -30,6 +30,7 @@ import warpflat
 from warpflat.app.cli.main import cli, main
 from warpflat.app.scene.as_toml import document_as_toml
 from warpflat.app.scene.load import make_scene
+from warpflat.app.scene.run import files_of_run
 from warpflat.core.errors import InputError
 from warpflat.core.toml_file import read_toml
 from warpflat.flat.surface.io.read import METRES_PER_UNIT
@@ -271,6 +272,22 @@ def test_every_row_of_the_equations_is_held_by_a_test_and_names_what_there_is() 
                 assert f"def {name.rpartition('.')[2]}(" in code, (path, name)
         path, test = re.findall(r"`(tests/[\w/]+\.py)::(\w+)`", row)[0]
         assert f"def {test}(" in (ROOT / path).read_text(encoding="utf-8"), test
+
+
+def test_the_help_and_the_page_on_runs_name_each_file_that_a_run_writes() -> None:
+    page = (ROOT / "docs" / "run.md").read_text(encoding="utf-8")
+    wished = {"picture": True, "frames": 9}
+    of_mesh = {"surface": {"shape": "dome"}, "wear": {}, "marker": {"width": 1.4}, "output": wished}
+    of_form = {"form": "skirt", "mannequin": {"size": "EU 38"}, "wear": {}, "output": wished}
+    draped = {**of_form, "drape": {"usd": True, "correct": True}}
+    for tables, command in ((of_mesh, "run"), (of_form, "run"), (draped, "drape")):
+        told = re.split(r"[\s,;]+", cli.commands[command].epilog or "")
+        for file in files_of_run(make_scene(tables, name="NAME", folder=Path(), where="trial")):
+            assert file in told, file
+            assert command == "drape" or f"`{file}`" in page, file
+    for file in ("mannequin.usdc", "NAME.rul", "NAME.CLOTH.marker."):
+        assert file in (cli.commands["run"].epilog or "")
+        assert file in page
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)

@@ -1,4 +1,4 @@
-"""What standard output gets, in processes of their own: JSON and nothing else, or nothing where it is closed or full."""
+"""What standard output gets, in a process of its own: JSON and nothing else, or nothing where it is closed or full."""
 
 from __future__ import annotations
 
@@ -59,13 +59,27 @@ def test_every_command_that_prints_json_is_tried():
     }
 
 
-@pytest.mark.parametrize("command", PRINTING.values(), ids=PRINTING)
-def test_json_is_all_that_is_printed(here: Path, command: list[str]):
+#: The program, once for each of the command lines on standard input; a page ends with its exit code.
+IN_TURN = """
+import json, sys
+from warpflat.__main__ import program
+for words in json.load(sys.stdin):
+    sys.argv[1:] = words
+    print(program(), end="\\f", flush=True)
+"""
+
+
+def test_json_is_all_that_is_printed(here: Path):
+    asked = json.dumps([[*command, "--json"] for command in PRINTING.values()])
     done = subprocess.run(
-        [sys.executable, "-m", "warpflat", *command, "--json"], cwd=here, capture_output=True, text=True, check=False
+        [sys.executable, "-c", IN_TURN], cwd=here, input=asked, capture_output=True, text=True, check=True
     )
-    assert done.returncode in (0, 1), done.stderr
-    assert isinstance(json.loads(done.stdout), dict)
+    *pages, rest = done.stdout.split("\f")
+    assert rest == ""
+    for command, page in zip(PRINTING, pages, strict=True):
+        printed, code = page[:-1], page[-1]
+        assert code in "01", (command, done.stderr)
+        assert isinstance(json.loads(printed), dict), command
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is full")

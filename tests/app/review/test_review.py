@@ -16,8 +16,9 @@ import pytest
 from PIL import Image
 
 from warpflat.app.cli.main import main
+from warpflat.app.cli.summary import summary_lines
 from warpflat.app.review.film import open_film
-from warpflat.app.review.page import verdict_words
+from warpflat.app.review.page import verdict_words, write_review
 from warpflat.app.scene.load import make_scene
 from warpflat.app.scene.run import run_scene
 from warpflat.core.errors import StepError
@@ -93,6 +94,22 @@ def test_all_frames_follow_from_the_layouts_that_the_page_holds(run: Path) -> No
         ends = [source.positions(frame) for frame in (before, after)]
         expected = (1.0 - share) * ends[0] + share * ends[1]
         np.testing.assert_allclose(source.positions(time), expected, atol=1e-6)
+
+
+def test_console_and_page_count_the_pieces_that_the_pattern_numbers(run: Path, tmp_path: Path) -> None:
+    metrics = json.loads((run / "metrics.json").read_text())
+    piece = metrics["pieces"]["trial"]
+    # A pair is one piece that is cut twice; what was drafted beside it is one of its own.
+    metrics["pieces"] = {"front_left": piece, "front_right": piece}
+    metrics["cloths"] = [
+        {"name": "woven", "pieces": [{"piece": "front_left", "title": "front"}, {"piece": "cuff", "title": "cuff"}]},
+        {"name": "interfacing", "pieces": [{"piece": name, "title": name} for name in ("cuff", "facing")]},
+    ]
+    write_review(tmp_path, metrics, [], name="trial", film=None)
+    assert "<b>3</b><span>pattern pieces</span>" in (tmp_path / "review.html").read_text(encoding="utf-8")
+    assert any(line.startswith("3 pattern pieces, ") for line in summary_lines(metrics, ["metrics.json"], "out"))
+    del metrics["cloths"]
+    assert any(line.startswith("2 pattern pieces, ") for line in summary_lines(metrics, ["metrics.json"], "out"))
 
 
 def test_the_command_writes_the_page_again_and_moving_pictures(

@@ -118,17 +118,17 @@ def test_a_known_pattern_is_graded_and_keeps_its_grain(tmp_path: Path):
 def test_several_bodies_are_a_study_with_asked_ease(command: Command):
     _skirt(Path("skirt.obj"), texture=False)
     ended = command(
-        "fit", "skirt.obj", "--units", "m", "--from", "EU 36", "--to", "EU 36", "--to", "EU 40", "--ease", "hip=90mm",
+        "fit", "skirt.obj", "--units", "m", "--from", "EU 36", "--to", "EU 36", "--to", "EU 42", "--ease", "hip=90mm",
         "--out", "study", *BARE,
     )  # fmt: skip
     assert (ended.code, ended.err) == (0, "")
     with Path("study/fit.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [row["body"] for row in rows] == ["EU 36", "EU 40"]
+    assert [row["body"] for row in rows] == ["EU 36", "EU 42"]
     for row in rows:
         assert float(row["ease_hip_mm"]) == pytest.approx(90.0, abs=4.0)
         assert row["kept"] == "True"
-    for folder in ("EU_36", "EU_40"):
+    for folder in ("EU_36", "EU_42"):
         assert Path("study", folder, "pattern.json").is_file()
 
 
@@ -273,6 +273,11 @@ def test_a_garment_ends_as_its_wearer_sits_where_the_pose_is_kept(command: Comma
     line = np.array(there["line"])
     assert np.linalg.norm(cloth.closest(line)[2] - line, axis=1).max() < 1e-4
     assert np.ptp(line[:, 1]) > 0.02
+    # An upright plane meets front and back, and cuts but the nearest if asked to.
+    upright = {"point": [0.0, middle, 1.0], "normal": [1.0, 0.0, 0.0]}
+    assert len(job.carry_cuts(sits, [{"plane": upright}])) == 2
+    (front,) = job.carry_cuts(sits, [{"plane": {**upright, "nearest": True}}])
+    assert np.array(front["line"])[:, 2].mean() > sits.vertices[:, 2].mean()
     (drawn,) = job.carry_cuts(sits, [{"points": same["line"][:2]}])
     np.testing.assert_allclose(drawn["points"], there["line"][:2], atol=1e-9)
     with pytest.raises(InputError, match="the plane misses the garment"):

@@ -201,7 +201,9 @@ def test_a_dart_that_only_woven_cloth_needs_is_in_each_of_them(
 
 
 def test_a_dart_that_a_run_leaves_out_is_not_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    scene = scene_in(tmp_path, 'form = "bodice"\nshape = "darts"\n[mannequin]\nsize = "EU 32"\nresolution_mm = 40\n')
+    scene = scene_in(
+        tmp_path, 'form = "bodice"\nhalf = true\nshape = "darts"\n[mannequin]\nsize = "EU 32"\nresolution_mm = 40\n'
+    )
     for garment in (
         compare_fabrics(scene, ["woven", "denim"]).results["woven"],
         edit_dart(scene, "front.waist dart", how="turn", aim="nothing").before.parts,

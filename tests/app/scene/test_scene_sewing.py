@@ -11,6 +11,7 @@ import pytest
 from warpflat.app.cli.summary import notes_line, summary_lines
 from warpflat.app.cli.tables import run_summary
 from warpflat.app.review.faults import faults_of
+from warpflat.app.review.page import seam_table
 from warpflat.app.scene.load import make_scene
 from warpflat.app.scene.run import run_scene
 from warpflat.core.errors import InputError
@@ -101,6 +102,21 @@ def test_the_console_is_a_line_each_and_none_is_wide(skirt):
     )
     assert notes_line(("the mesh was mended",)) == "note: the mesh was mended"
     assert energy_words(3.07e-20) == "0 mJ"
+
+
+def test_console_and_page_show_the_same_figures_of_a_seam(skirt):
+    result, _ = skirt
+    seam = {
+        **result.metrics["seams"][0],
+        "name": "hem",
+        "length_mm": [100.04, 105.4],
+        "ease": 0.0539,
+        "difference_mm": -4e-4,
+    }
+    text, page = run_summary({**result.metrics, "seams": [seam]}, (), "out"), seam_table({"seams": [seam]})
+    for words in ("100.0 mm", "105.4 mm", "+5.39 %", "+0.00 mm"):
+        assert words in text
+        assert f">{words}<" in page
 
 
 def test_the_console_shows_ease_and_prices(skirt):

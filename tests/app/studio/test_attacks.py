@@ -215,9 +215,9 @@ def test_a_fault_of_the_program_is_one_line_and_the_studio_goes_on(
         def fail(_: object, error: Exception = error) -> None:
             raise error
 
-        monkeypatch.setattr(studio.page, "_choose_mode", fail)
+        monkeypatch.setattr(studio.page, "choose_mode", fail)
         first = len(studio.told)
-        studio.page.server._thread_executor.submit(studio.page._choose_mode, True).result(10.0)
+        studio.page.server._thread_executor.submit(studio.page.choose_mode, True).result(10.0)
         assert studio.told[first:] == [words]
         studio.check_that_it_goes_on()
 

@@ -21,7 +21,7 @@ from warpflat.flat.fabric.library import find_fabric
 from warpflat.flat.flattening.flatten_piece import flatten
 from warpflat.flat.model.membrane import Model, choose_model, plane_stress
 from warpflat.flat.model.network import SpringNetwork, _repeated
-from warpflat.flat.model.springs import springs_of
+from warpflat.flat.model.springs import springs_of, stretch_factor
 from warpflat.flat.solver.options import RelaxOptions
 from warpflat.flat.solver.steps import Relaxation
 from warpflat.flat.surface.cells import make_cells
@@ -361,6 +361,13 @@ def test_a_network_of_longer_springs_and_larger_cells_has_these():
         np.testing.assert_allclose(two, factor * one, rtol=1e-12, err_msg=name)
     np.testing.assert_allclose(larger.cells.laid.numpy(), 1.5 * network.cells.laid.numpy(), rtol=1e-12)
     np.testing.assert_allclose(larger.mass.numpy(), 2.25 * network.mass.numpy(), rtol=1e-12)
+
+
+def test_a_vector_is_stretched_by_its_components_and_one_of_no_length_not_at_all():
+    longer = stretch_factor(
+        np.array([[3.0, 4.0], [0.0, 2.0], [0.0, 0.0]]), np.array([[2.0, 1.0], [5.0, 1.5], [2.0, 2.0]])
+    )
+    np.testing.assert_allclose(longer, [np.sqrt(52.0) / 5.0, 1.5, 1.0])
 
 
 def test_springs_weighed_anew_have_the_new_stiffness_at_both_ends():

@@ -131,13 +131,16 @@ def check_gores(result: Any) -> None:
 
 @pytest.mark.parametrize("options", [{}, {"find": "uv"}, {"find": "file"}, {"find": "auto"}, {"component": "all"}])
 def test_a_welded_tube_of_four_islands_is_four_pieces_in_every_format(tmp_path: Path, options: dict[str, Any]) -> None:
-    for path in (
-        write_obj(tmp_path / "skirt.obj"),
-        write_obj(tmp_path / "corners.obj", each_corner=True),
-        write_usd(tmp_path / "skirt.usda"),
-        write_glb(tmp_path / "skirt.glb"),
-        write_glb(tmp_path / "hard.glb", normals=True),
-    ):
+    paths = [write_obj(tmp_path / "skirt.obj")]
+    if options in ({}, {"component": "all"}):
+        # What is asked of islands does not depend on the file that they come from.
+        paths += [
+            write_obj(tmp_path / "corners.obj", each_corner=True),
+            write_usd(tmp_path / "skirt.usda"),
+            write_glb(tmp_path / "skirt.glb"),
+            write_glb(tmp_path / "hard.glb", normals=True),
+        ]
+    for path in paths:
         if path.name == "skirt.glb" and options == {"component": "all"}:
             # Apart in the file, they are pieces anyway.
             assert found(path, **options) is None
@@ -191,7 +194,7 @@ def test_seams_that_are_left_out_of_a_file_are_told_to_be_its_own(tmp_path: Path
 
 def test_islands_that_are_no_pattern_are_taken_only_when_asked(tmp_path: Path) -> None:
     # A ball in two halves, in a texture that keeps their area: as large as cut pieces, and far from flat.
-    ball = trimesh.creation.icosphere(4, radius=0.15)
+    ball = trimesh.creation.icosphere(3, radius=0.15)
     front = ball.triangles_center[:, 2] > 0.0
     unit = ball.vertices / 0.15
     rows = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in ball.vertices]

@@ -12,7 +12,7 @@ from warpflat.garment.construction.details import FinishingTable, OpeningTable
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.line_drawing import describe_worn
 from warpflat.pattern.drafting.piece_parts import Edge
-from warpflat.pattern.drafting.pieces import Piece
+from warpflat.pattern.drafting.pieces import Pattern, Piece
 
 
 def skirt(opening: OpeningTable, *, half: bool) -> Garment:
@@ -143,9 +143,29 @@ def test_patches_are_drawn_on_their_side_of_the_body():
     outline = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     edges = [Edge(name=str(k), points=outline[[k, (k + 1) % 3]]) for k in range(3)]
     marked = Piece(name=flat.surface.name, edges=edges, internal_lines=lines)
-    plain, drawn = (describe_worn({"": garment}, "", pieces=pieces).views for pieces in ((), (marked,)))
+    pattern = Pattern(name="p", pieces={"": [marked]})
+    plain, drawn = (describe_worn({"": garment}, "", pattern=each).views for each in (None, pattern))
     assert len(drawn["back"]) == len(plain["back"])
     (patch,) = drawn["front"][-1].lines
     # Closed where it is left open on the piece, and as large as that.
     assert np.allclose(patch[0], patch[-1])
     assert np.ptp(patch, axis=0) == pytest.approx([0.1, 0.1], abs=0.01)
+
+
+def test_a_band_that_draws_the_garment_in_is_its_finished_measure():
+    band = FinishingTable(kind="band", edge="waist", width_mm=40, share=0.9)
+    garment = replace(
+        flat_form("skirt", OpeningTable(kind="zip", seam="side left", length_mm=200), half=False), openings=()
+    )
+    finished = []
+    for finishing in ((), (band,)):
+        pattern = pattern_of(replace(garment, finishing=finishing))
+        assert pattern.worn is not None
+        finished.append({measure.name: measure.finished for measure in pattern.worn.measures[""]})
+    plain, drawn = finished
+    lengths = [piece.edge("lower").length for piece in pattern.pieces[""] if piece.role == "strip"]
+    assert drawn["waist"] == pytest.approx(sum(lengths), abs=1e-6)
+    assert drawn["waist"] == pytest.approx(0.9 * plain["waist"], rel=0.01)
+    assert {name: length for name, length in drawn.items() if name != "waist"} == {
+        name: length for name, length in plain.items() if name != "waist"
+    }

@@ -80,7 +80,7 @@ def test_opening_that_is_needed_lets_the_ring_pass():
     )
     assert not neck.passes
     assert neck.opening_needed_mm == 100.0
-    assert "neck 100 mm (372 < head 570)" in rings_line([neck.as_dict()])
+    assert "neck 10 cm (37.2 < head 57.0)" in rings_line([neck.as_dict()])
 
 
 def test_darts_do_not_open_a_ring(mannequin: Mannequin):

@@ -28,11 +28,13 @@ def bent(body: Mannequin) -> Mannequin:
     return with_bent_elbows(body)
 
 
-def _sleeve(body: Mannequin, name: str = "shirt", *, woven: bool = True) -> tuple[FormResult, Garment]:
+def _sleeve(
+    body: Mannequin, name: str = "shirt", *, woven: bool = True, fabric: str = "isotropic"
+) -> tuple[FormResult, Garment]:
     whole = shaped_form(body.layout, shipped_form(name), "none", body.vertices, woven=woven)
     darts = tuple(replace(dart, mirrored=False) for dart in whole.darts if dart.piece == "sleeve_left")
     form = body.form(replace(whole, pieces={"sleeve_left": whole.pieces["sleeve_left"]}, darts=darts))
-    return form, flatten_form(body, form)
+    return form, flatten_form(body, form, fabric=fabric)
 
 
 def _hem(form: FormResult, garment: Garment, level: str = "wrist") -> np.ndarray:
@@ -90,8 +92,7 @@ def test_short_sleeve_is_not_wrung_and_its_hem_is_straight(body: Mannequin) -> N
 
 def test_a_loose_sleeve_hangs_from_the_armhole_without_a_saddle() -> None:
     body = body_of_size(15.0)
-    form, _ = _sleeve(body)
-    garment = flatten_form(body, form, fabric="woven")
+    form, garment = _sleeve(body, fabric="woven")
     assert garment.pieces["sleeve_left"].measures["wear"]["outside"] < 0.006
     # It is as wide at the biceps as asked for.
     layout = body.layout

@@ -110,6 +110,19 @@ def test_cloth_gapes_at_its_edges_and_stands_off_inside(worn: warpflat.Drape):
         assert words in place.words
 
 
+def test_a_place_that_goes_on_into_another_piece_names_both(worn: warpflat.Drape):
+    """Its area may be larger than that of the piece that its worst vertex lies in."""
+    cloth, ones = worn.cloth, np.ones(len(worn.cloth.designed))
+    both = {name: np.isin(np.arange(len(ones)), cloth.welded[rows]) for name, rows in cloth.piece_vertices.items()}
+    for near, said in ((ones > 0.0, " of front and back"), (both["front"] & ~both["back"], "")):
+        lift = np.where(near, 0.02, 0.0)
+        (place,) = find_places(
+            cloth, worn.areas, misfit=lift, meant_to_touch=near, bridged=0.0 * ones, lift=-lift, gap=0.0 * ones,
+            strains=no_strains(cloth.faces), gathered=ones < 0.0,
+        )  # fmt: skip
+        assert place.words.endswith(f"falls in by 20.0 mm over {1e4 * worn.areas[near].sum():,.0f} cm2{said}")
+
+
 @pytest.mark.parametrize(
     ("faces", "words"),
     [
@@ -287,6 +300,8 @@ def test_what_cannot_be_draped_is_refused(bodice: warpflat.Garment):
         warpflat.drape([])
     with pytest.raises(InputError, match="friction = -1"):
         warpflat.DrapeOptions(friction=-1.0)
+    with pytest.raises(InputError, match=r"max_steps = 5000\.0; must be a whole number"):
+        warpflat.DrapeOptions(max_steps=5e3)
 
 
 def test_a_scene_with_a_drape_reports_it(tmp_path: Path):

@@ -87,7 +87,7 @@ def test_levels_agree_with_tapes_laid_without_the_package(kind: str, sex: str) -
 
 
 @needs_bodies
-@pytest.mark.parametrize(("sex", "pose"), [("female", "arms level"), ("male", "arms down")])
+@pytest.mark.parametrize(("sex", "pose"), [("female", "arms level"), ("male_heavy", "arms down")])
 def test_a_bust_is_one_whatever_the_arms_do(sex: str, pose: str) -> None:
     plain, posed = scanned_body(sex).measures, posed_body(sex, pose).measures
     for name in ("bust", "underbust"):
@@ -130,20 +130,24 @@ def _arms(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 @needs_bodies
-@pytest.mark.parametrize("apart", [True, False])
-def test_parts_that_are_wound_inward_are_turned(apart: bool) -> None:
-    points, faces = scan("male")
-    arms, faces = _arms(points, faces), faces.copy()
+def test_a_body_with_forty_holes_and_parts_wound_inward_is_measured_as_the_whole_one() -> None:
+    """Both arms are turned: the left is a part of its own, a seam's width off the trunk, the right hangs together with it."""
+    points, whole = scan("male")
+    _, faces = copy_of_body(points, whole, "holes", 0.0, 0.0, 0.0)
+    assert len(faces) < len(whole) - 500
+    arms = _arms(points, faces)
     turned = np.where(faces[:, 3:] < 0, faces[:, [0, 2, 1, 3]], faces[:, [0, 3, 2, 1]])
     faces[arms] = turned[arms]
-    if apart:
-        # Parts of their own, a seam's width off the trunk.
-        faces[arms] = np.where(faces[arms] < 0, -1, faces[arms] + len(points))
-        points = np.concatenate([points, points * [1.002, 1.0, 1.0]])
-    body, plain = on_scan(points, faces, 40.0), scanned_body("male")
+    left = arms & (points[faces[:, 0], 0] > 0.0)
+    faces[left] = np.where(faces[left] < 0, -1, faces[left] + len(points))
+    body, plain = on_scan(np.concatenate([points, points * [1.002, 1.0, 1.0]]), faces, 40.0), scanned_body("male")
     assert any("wound inward were turned" in note for note in body.notes)
-    for name in ("bust", "waist", "biceps left", "biceps right"):
-        assert body.measures[name].girth == pytest.approx(plain.measures[name].girth, abs=0.004), name
+    assert any(note.startswith("holes, over which the body model's skin is taken") for note in body.notes)
+    # Holes in hands, face and feet are too deep for what is told of them.
+    for name, tape in plain.measures.items():
+        if name.split(" ")[0] not in ("head", "hand", "foot"):
+            assert abs(body.measures[name].height - tape.height) < 0.004, name
+            assert abs(body.measures[name].girth - tape.girth) < (0.004 if name.startswith("biceps") else 0.009), name
 
 
 @needs_bodies
@@ -259,25 +263,31 @@ def test_units_and_poses_are_recognised() -> None:
 
 
 @needs_bodies
-def test_holes_at_hands_and_feet() -> None:
+def test_a_body_without_hands_and_feet_is_measured_above_and_says_so() -> None:
     points, faces = scan("female")
-    middle = points[faces[:, :3]].mean(axis=1)
-    kept = faces[(middle[:, 1] > 0.03) & (np.abs(middle[:, 0]) < 0.44)]
+    low = points[faces[:, :3], 1].min(axis=1)
+    kept = faces[(low > 0.06 * points[:, 1].max()) & (np.abs(points[faces[:, :3]].mean(axis=1)[:, 0]) < 0.44)]
     assert len(kept) < len(faces) - 500
     body, plain = on_scan(points, kept), scanned_body("female")
     for level in ("bust", "waist", "hip"):
         assert abs(body.levels()[level].girth - plain.levels()[level].girth) < 0.004
     assert len(self_intersections(body.vertices, body.layout.body_faces)) == 0
+    assert any(
+        re.search(
+            "foot left and foot right.* could not be measured on the scan; heights count from its lowest point", note
+        )
+        for note in body.notes
+    ), body.notes
+    assert body.measures["ankle left"].guess is not None
 
 
 @needs_bodies
-def test_landmarks_and_mirroring() -> None:
+def test_left_and_right_are_averaged_or_kept() -> None:
     points, faces = scan("female")
     lopsided = points + np.outer(
         0.02 * np.exp(-0.5 * ((points[:, 1] - 1.1) / 0.1) ** 2) * (points[:, 0] > 0.05), [1, 0, 0]
     )
-    even, kept = on_scan(lopsided, faces, landmarks={"waist": 1.05}), on_scan(lopsided, faces, symmetric=False)
-    assert even.levels()["waist"].height == pytest.approx(1.05)
+    even, kept = on_scan(lopsided, faces), on_scan(lopsided, faces, symmetric=False)
     assert np.abs(even.vertices[even.layout.mirror] * [-1, 1, 1] - even.vertices).max() < 1e-9
     assert np.abs(kept.vertices[kept.layout.mirror] * [-1, 1, 1] - kept.vertices).max() > 0.015
     for form, done in ((even, "their average is taken"), (kept, "they are kept")):
@@ -286,8 +296,6 @@ def test_landmarks_and_mirroring() -> None:
         assert re.search(r"trunk by up to (1[5-9]|2[0-2]) mm at a height of 1\.(0[5-9]|1[0-5]) m", note)
         assert done in note
     assert not any("left and right differ" in note for note in scanned_body("female").notes)
-    with pytest.raises(InputError, match="does not lie above"):
-        on_scan(points, faces, landmarks={"waist": 0.6})
 
 
 @needs_bodies
@@ -366,20 +374,6 @@ def test_scan_with_a_vertex_far_off_names_it(tmp_path: Path) -> None:
 
 
 @needs_bodies
-def test_a_body_with_forty_holes_is_measured_as_the_whole_one() -> None:
-    points, faces = scan("male")
-    _, torn = copy_of_body(points, faces, "holes", 0.0, 0.0, 0.0)
-    assert len(torn) < len(faces) - 500
-    body, plain = on_scan(points, torn, 40.0), scanned_body("male")
-    assert any(note.startswith("holes, over which the body model's skin is taken") for note in body.notes)
-    # Holes in hands, face and feet are too deep for what is told of them.
-    for name, whole in plain.measures.items():
-        if name.split(" ")[0] not in ("head", "hand", "foot"):
-            assert abs(body.measures[name].height - whole.height) < 0.004, name
-            assert abs(body.measures[name].girth - whole.girth) < 0.009, name
-
-
-@needs_bodies
 def test_limbs_agree_with_tapes_laid_without_the_package_with_arms_level() -> None:
     points, faces = scan("female")
     posed, body = posed_scan("female", "arms level"), posed_body("female", "arms level")
@@ -435,14 +429,6 @@ def test_a_trunk_that_is_no_body_is_refused_with_its_place() -> None:
 
 
 @needs_bodies
-def test_a_scan_that_does_not_show_the_crotch_is_no_refusal() -> None:
-    points, faces = scan("female")
-    hidden = (np.abs(points[:, 0]) < 0.05) & (points[:, 1] > 0.66) & (points[:, 1] < 0.77)
-    body = on_scan(points, faces[~hidden[faces[:, :3]].any(axis=1)])
-    assert body.measures["hip"].girth == pytest.approx(scanned_body("female").measures["hip"].girth, abs=0.004)
-
-
-@needs_bodies
 def test_a_trunk_that_is_narrowest_under_the_bust_has_a_guessed_waist_below() -> None:
     points, faces = scan("female")
     # The trunk grows broader from right below the underbust at 1.11 m down.
@@ -486,14 +472,16 @@ def test_skirts_and_trousers_hang_outside_the_body(form: str, sex: str) -> None:
 
 
 @needs_bodies
-def test_one_foot_ahead_does_not_turn_the_trunk() -> None:
+def test_one_foot_ahead_does_not_turn_the_trunk_and_a_crotch_that_is_not_shown_is_no_refusal() -> None:
     points, faces = scan("female")
     ahead = points.copy()
     step = np.clip((0.5 * 1.59 - (points[:, 1] - points[:, 1].min())) / (0.5 * 1.59), 0.0, 1.0)
     ahead[:, 2] += 0.14 * step * (points[:, 0] > 0.0)
-    plain, body = scanned_body("female"), on_scan(ahead, faces)
+    hidden = (np.abs(points[:, 0]) < 0.05) & (points[:, 1] > 0.66) & (points[:, 1] < 0.77)
+    plain, body = scanned_body("female"), on_scan(ahead, faces[~hidden[faces[:, :3]].any(axis=1)])
     upper = plain.layout.rings[plain.layout.level_row["waist"] :]
     assert np.linalg.norm(body.vertices[upper] - plain.vertices[upper], axis=2).max() < 0.003
+    assert body.measures["hip"].girth == pytest.approx(plain.measures["hip"].girth, abs=0.004)
 
 
 @needs_bodies

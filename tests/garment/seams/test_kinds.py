@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 
 import numpy as np
 import pytest
@@ -120,6 +121,13 @@ def anatomy_of(surface: Surface) -> Anatomy:
     return find_anatomy(cloth)
 
 
+@cache
+def known(make: Callable[[], Surface]) -> tuple[Surface, Anatomy]:
+    """A garment by formula and what it is, each once in a process."""
+    surface = make()
+    return surface, anatomy_of(surface)
+
+
 @pytest.mark.parametrize(
     ("kind", "make"),
     [
@@ -187,9 +195,9 @@ def test_armholes_are_sleeves_on_both_sides_or_on_none() -> None:
 
 @pytest.mark.parametrize("make", [solids.shirt, solids.trousers, solids.jumpsuit, solids.skirt, poncho])
 def test_what_stands_on_its_head_is_turned_upright(make: Callable[[], Surface]) -> None:
-    plain = make()
+    plain, upright = known(make)
     turned = warpflat.make_surface(plain.vertices * [1.0, -1.0, -1.0], plain.faces, closed=True)
-    upright, upset = anatomy_of(plain), anatomy_of(turned)
+    upset = anatomy_of(turned)
     assert axis_name(upright.up) == "+y"
     assert describe(upset) == describe(upright)
     assert axis_name(upset.up) == "-y"
@@ -198,11 +206,11 @@ def test_what_stands_on_its_head_is_turned_upright(make: Callable[[], Surface]) 
 
 @pytest.mark.parametrize(("make", "least"), [(solids.trousers, 0.4), (solids.shirt, 0.5), (solids.jumpsuit, 0.5)])
 def test_a_toys_clothes_are_no_garments_and_a_childs_are(make: Callable[[], Surface], least: float) -> None:
-    plain = make()
+    plain, adult = known(make)
     child, toy = (
         anatomy_of(warpflat.make_surface(share * plain.vertices, plain.faces, closed=True)) for share in (least, 0.15)
     )
-    assert child.kind == anatomy_of(plain).kind
+    assert child.kind == adult.kind
     assert toy.kind == "other"
 
 

@@ -422,7 +422,7 @@ def test_wrinkles_are_smoothed_on_request_and_tubes_keep_their_girth() -> None:
 def test_both_sides_of_a_seam_are_as_long_between_the_corners_at_which_its_pattern_is_parted() -> None:
     parts = [solids.rod([0, 0, 0], [0, 0.17, 0], 0.045, 0.5), solids.rod([0.02, 0.06, 0], [0.085, 0.14, 0], 0.016)]
     opening = [([0, 0.0, 0], [0, -1, 0])]
-    mitten = solids.skin(solids.joined(parts, 0.006), [-0.07, -0.07, -0.05], [0.13, 0.24, 0.05], 0.009, opening)
+    mitten = solids.skin(solids.joined(parts, 0.006), [-0.07, -0.07, -0.05], [0.13, 0.24, 0.05], 0.012, opening)
     found = warpflat.find_seams(mitten, fabric="woven")
     flat = [warpflat.flatten(piece, fabric="woven") for piece in found.pieces]
     garment = warpflat.sew_pieces(flat, eased=True)
@@ -449,7 +449,7 @@ def test_limbs_are_parted_where_they_begin() -> None:
 
 
 def test_the_gores_of_a_ball_are_drawn_once() -> None:
-    found = warpflat.find_seams(surface_of(trimesh.creation.icosphere(4, radius=0.11)))
+    found = warpflat.find_seams(surface_of(trimesh.creation.icosphere(3, radius=0.11)))
     flat = [warpflat.flatten(piece, datum="grain") for piece in found.pieces]
     pattern, _ = pattern_of_garment({"": warpflat.sew_pieces(flat, eased=True)}, name="ball")
     assert [piece.quantity for row in pattern.pieces.values() for piece in row] == [8]

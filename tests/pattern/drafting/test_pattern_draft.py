@@ -25,6 +25,7 @@ from warpflat.pattern.drafting.draft import draft_garment, draft_piece, nest_lab
 from warpflat.pattern.drafting.drawing import OnPaper, draw_nest, draw_piece
 from warpflat.pattern.drafting.fitting import uncrossed
 from warpflat.pattern.drafting.layout import lay_out, nests
+from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
 
@@ -323,7 +324,7 @@ def curved_dart(mouth, bends=(0.08, 0.08), length=0.1):
 def test_a_dart_without_room_for_its_allowances_is_folded_along_its_middle(mouth, bends):
     piece = curved_dart(mouth, bends)
     (dart,) = piece.darts
-    assert any(f"is folded, not cut away: its mouth of {mouth * 1000:.0f} mm" in note for note in piece.notes)
+    assert any(f"is folded, not cut away: its mouth of {length_words(mouth)} has" in note for note in piece.notes)
     assert {(n.edge, n.seam) for n in piece.notches} == {("l", "d"), ("r", "d")}
     wedge = shapely.Polygon(np.concatenate([piece.edge("l").line, piece.edge("r").line[1:]]))
     cut = shapely.Polygon(piece.cut_line)
@@ -357,7 +358,17 @@ def test_the_label_tells_the_allowances_of_a_dart_that_is_cut_away(cut, said):
 def test_legs_of_different_length_are_noted():
     corners = [(0, 0), (0.1, 0), (0.12, 0.15), (0.14, 0.004), (0.3, 0), (0.3, 0.3), (0, 0.3)]
     piece = draft_piece(polygon("p", corners, kinds=KINDS, darts=[Dart(name="d", left="e1", right="e2")]))
-    assert any("legs differ by 3.9 mm" in note or "legs differ by 4.0 mm" in note for note in piece.notes)
+    assert any("legs differ by 0.39 cm" in note or "legs differ by 0.4 cm" in note for note in piece.notes)
+
+
+@pytest.mark.parametrize(
+    ("units", "said"),
+    [("cm", "fold 10 cm, sew 8 cm"), ("mm", "fold 100 mm, sew 80 mm"), ("in", "fold 3 15/16 in, sew 3 1/8 in")],
+)
+def test_notes_that_are_printed_are_in_the_units_of_the_pattern(units, said):
+    pleat = Dart(name="d", left="e1", right="e2", pleat=0.08)
+    piece = draft_piece(replace(polygon("p", DARTED, kinds=KINDS, darts=[pleat]), units=units))
+    assert piece.notes == (f"pleat d: {said} down from the edge",)
 
 
 def test_a_fisheye_dart_is_marked_not_cut():
@@ -386,7 +397,7 @@ def test_a_hole_gets_its_allowance_inwards_or_a_note():
     for hole in (eyelet, raw):
         assert hole.width == 0
         assert np.array_equal(hole.cut_line, hole.sew_line)
-    assert piece.notes == ("eyelet is too small for an allowance of 10 mm: it is cut on its sewing line",)
+    assert piece.notes == ("eyelet is too small for an allowance of 1 cm: it is cut on its sewing line",)
     roles = {stroke.name: stroke.role for stroke in draw_piece(piece).strokes}
     assert (roles["vent"], roles["vent.sew"]) == ("cutout", "sew")
     assert "eyelet.sew" not in roles

@@ -380,6 +380,54 @@ def test_ring_is_sewn_after_the_seams_that_it_crosses():
     assert "crown to side: " not in " ".join(steps)
 
 
+def test_what_is_cut_twice_is_sewn_twice_and_once_where_both_seams_are_named():
+    pattern = top()
+    front, _, back = pattern.pieces[""]
+    binding = polygon(
+        "binding", [(0.0, 0.0), (0.4, 0.0), (0.4, 0.03), (0.0, 0.03)], names=("lower", "r", "upper", "l"), quantity=2,
+        role="strip", paired=False,
+    )  # fmt: skip
+    seams = [seam for seam in pattern.seams if seam.name.endswith(" left")]
+    seams += [
+        sewn("binding.lower", "front.armhole left + back_left.armhole left", "binding"),
+        sewn("binding.r", "binding.l", "ends"),
+    ]
+    made = replace(pattern, pieces={"": [front, replace(back, quantity=2), binding]}, seams=seams)
+    assert {seam.name: seam.count for seam in sewn_seams(draft_garment(made), "")}.items() >= {
+        "ends": 2,
+        "binding": 2,
+    }.items()
+    # A shirt's two sleeves are one piece that is cut twice; its seams are called by the pieces that they join.
+    box = [(0.0, 0.0), (0.3, 0.0), (0.3, 0.4), (0.0, 0.4)]
+    sleeve = polygon("left_sleeve", box, names=("hem", "seam", "top", "seam 2"), quantity=2)
+    body = polygon("body", box, names=("hem", "to left_sleeve", "neck", "to right_sleeve"))
+
+    def joined(name: str, edge: str, other: str, *mirrored: bool) -> Seam:
+        first, second = (
+            SeamSide(piece=text.split(".")[0], edge=text.split(".")[1], mirrored=turned, reversed=k == 1)
+            for k, (text, turned) in enumerate(zip((edge, other), mirrored, strict=True))
+        )
+        return Seam(name=name, sides=((first,), (second,)))
+
+    around = [
+        joined("seam of the left sleeve", "left_sleeve.seam", "left_sleeve.seam 2", False, False),
+        joined("seam of the left sleeve 2", "left_sleeve.seam 2", "left_sleeve.seam", True, True),
+        joined("body to left sleeve", "body.to left_sleeve", "left_sleeve.top", False, False),
+        joined("body to left sleeve 2", "body.to right_sleeve", "left_sleeve.top", False, True),
+    ]
+    made = Pattern(name="shirt", pieces={"": [body, sleeve]}, seams=around)
+    assert [seam.count for seam in sewn_seams(draft_garment(made), "")] == [2, 2]
+
+
+@pytest.mark.parametrize(("height", "said"), [(0.02, "stretch the band"), (0.2, "ease in the body")])
+def test_a_slender_ring_is_stretched_as_it_is_sewn_on(height, said):
+    body = polygon("body", [(0.0, 0.0), (0.56, 0.0), (0.56, 0.4), (0.0, 0.4)], names=("hem", "right", "top", "left"))
+    band = polygon("band", [(0.0, 0.0), (0.5, 0.0), (0.5, height), (0.0, height)], names=("lower", "r", "upper", "l"))
+    seams = [sewn("band.lower", "body.top", ease=0.12), sewn("band.r", "band.l"), sewn("body.right", "body.left")]
+    garment = draft_garment(Pattern(name="p", pieces={"": [body, band]}, seams=seams))
+    assert said in " ".join(step.words for step in sewing_steps(garment, ""))
+
+
 def test_hems_of_two_widths_on_one_piece_are_told_by_their_names():
     pattern = top()
     pieces = [

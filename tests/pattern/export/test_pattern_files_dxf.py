@@ -158,9 +158,12 @@ def test_the_sample_size_is_one_that_is_written_and_notes_say_what_is_cut(dress,
     write_dxf(dress, tmp_path / "p.dxf", sizes=["36", "40"], rul=tmp_path / "p.rul")
     assert "SAMPLE SIZE: 36" in (tmp_path / "p.dxf").read_text()
     assert "SAMPLE SIZE: 36" in (tmp_path / "p.rul").read_text()
-    square = Piece(name="square", edges=sides([(0, 0), (0.2, 0), (0.2, 0.2), (0, 0.2)]), quantity=3)
+    edges = sides([(0, 0), (0.2, 0), (0.2, 0.2), (0, 0.2)])
+    square = Piece(name="square", edges=edges, quantity=3, fabric="twill", also={"interfacing": 1})
     write_dxf(draft_garment(Pattern(name="p", pieces={"": [square]})), tmp_path / "q.dxf")
-    assert "ANNOTATION: Cut 3" in (tmp_path / "q.dxf").read_text()
+    written = (tmp_path / "q.dxf").read_text()
+    assert "ANNOTATION: Cut 3 - twill" in written
+    assert "ANNOTATION: Cut 1 - interfacing" in written
 
 
 def test_inches(dress, tmp_path):

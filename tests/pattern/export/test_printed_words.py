@@ -20,7 +20,7 @@ from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.drawing import draw_piece
 from warpflat.pattern.drafting.half_pieces import halved
 from warpflat.pattern.drafting.measures import length_words, name_in_units
-from warpflat.pattern.drafting.piece_parts import Edge
+from warpflat.pattern.drafting.piece_parts import Dart, Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece
 from warpflat.pattern.drafting.sewing_order import sewing_steps
 from warpflat.pattern.drafting.words import language_words
@@ -179,6 +179,24 @@ def test_what_is_cut_from_a_cloth_is_told_with_all_mirrored_copies(tmp_path: Pat
     said = " ".join(page.extract_text() for page in PdfReader(tmp_path / "p.pdf").pages)
     assert "cuff 6, 3 mirrored" in said
     assert "cuff 2, 1 mirrored" in said
+
+
+def test_label_and_page_tell_the_same_allowances(tmp_path: Path):
+    """A dart that is cut away has an allowance along its legs; an edge without one is not told."""
+    corners = [(0, 0), (0.1, 0), (0.15, 0.1), (0.2, 0), (0.3, 0), (0.3, 0.3), (0, 0.3)]
+    garment = drafted(
+        polygon(
+            "bodice",
+            corners,
+            kinds=("hem", "dart", "dart", "hem", "seam", "seam", "seam"),
+            widths=(0.03, 0.008, 0.008, 0.03, 0.01, 0.0, 0.01),
+            darts=[Dart(name="d", left="e1", right="e2", cut=True)],
+        )
+    )
+    assert "Includes seam 0.8/1 cm, hem 3 cm" in [text for text, _ in garment.pieces[""][0].label.lines]
+    write_pdf(garment, tmp_path / "p.pdf")
+    said = " ".join(page.extract_text() for page in PdfReader(tmp_path / "p.pdf").pages)
+    assert "Allowances are included: seams 0.8 cm and 1 cm, hems 3 cm." in said
 
 
 def test_lines_of_another_program_are_given_no_finish(tmp_path: Path):

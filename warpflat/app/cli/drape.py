@@ -25,6 +25,9 @@ _FILES = """\b
   NAME.draped.obj  each piece as it is worn [m], with the pattern [m] as texture coordinates
   drape.png        gap, strain and shear from the front, the side and the back
   drape.webp       how the cloth comes to rest
+  worn.usdc        with --usd: the worn garment as one mesh
+  corrected.png, NAME.corrected.dxf, NAME.corrected.svg
+                   with --correct: the outlines before and after, and the corrected pattern
 Of a pattern these, frames.usdc and metrics.json come out alone."""
 
 
@@ -89,7 +92,7 @@ def drape(
         if edges:
             lines, notes = edge_table(scene, sewing=seams, units=units)
             for note in notes:
-                tell(note)
+                tell(f"note: {note}")
             click.echo("\n".join(lines))
             return DONE
         start_warp_silently()
@@ -101,7 +104,7 @@ def drape(
         )  # fmt: skip
         warnings = faults_of(result.metrics)
         # What was left out has a line of its own at the end.
-        left = [note for note in result.notes if note not in result.metrics.get("notes", ())]
+        left = [f"note: {note}" for note in result.notes if note not in result.metrics.get("notes", ())]
         for line in (*(left if output.tells else ()), *warnings):
             tell(line)
         output.report(

@@ -89,6 +89,6 @@ def export(
     )
     if not quiet:
         for note in notes:
-            tell(note)
+            tell(f"note: {note}")
         click.echo(f"{files[0].parent}: {', '.join(file.name for file in files)}")
     return DONE

@@ -81,7 +81,7 @@ _FILES = """\b
 @scene_option("bands", help="As for warpflat flatten.")
 @scene_option("name", help="Name of the files.  [default: the garment's]")
 @scene_option("output.frames")
-@click.option("--no-picture", is_flag=True, help="Write no picture.png.")
+@click.option("--no-picture", is_flag=True, help="Write no pictures, and no review.html, which shows them.")
 @output_options(folder="out/NAME-fitted", printed="fit.json")
 def fit(
     garment: Path,

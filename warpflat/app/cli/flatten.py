@@ -37,7 +37,7 @@ _CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|mar
     "[default: where its borders are nearest]",
 )
 @scene_options("start", "output.frames")
-@click.option("--no-picture", is_flag=True, help="Write no picture.png.")
+@click.option("--no-picture", is_flag=True, help="Write no pictures, and no review.html, which shows them.")
 @output_options()
 def flatten(
     mesh: Path,

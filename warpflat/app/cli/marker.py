@@ -16,6 +16,9 @@ _EPILOG = """\b
 What comes out, in DIR:
   NAME.marker.svg   the lay in true size: pieces, grain and names on the cloth
   NAME.marker.json  its width and length [m], the share that is used, and where each piece lies
+  NAME.CLOTH.marker.svg, NAME.CLOTH.marker.json
+                    the same of every further cloth
+  metrics.json      in a folder that holds no run: what was written
 
 \b
 Exit codes:
@@ -143,6 +146,6 @@ def marker(
         click.echo(json.dumps({"schema": 1, "markers": plans}))
     elif not quiet:
         for note in notes:
-            tell(note)
+            tell(f"note: {note}")
         click.echo(f"{files[0].parent}: {', '.join(file.name for file in files)}")
     return FAULTY if any("not_made" in plan for plan in plans) else DONE

@@ -46,15 +46,20 @@ Exit codes:
 
 RUN_FILES = """\b
 What comes out, in DIR:
-  metrics.json  errors, energies [J], flips and stages of every piece
-  NAME.obj      the surface [m] with the pattern [m] as texture coordinates
-  frames.usdc   surface and pattern from the development to the end, coloured by energy
-  picture.png   both side by side, with a scale in J/m2
-  review.html   all of it on one page, with the film; needs no network
-  NAME.dxf      the pattern for apparel CAD: cut and sewing lines, notches, grain
-  NAME.svg      the same for screen and plotter, in millimetres
-  pattern.pdf   the same in true size, tiled on A4
-  pattern.json  everything of the pattern; warpflat export makes the others from it"""
+  metrics.json    errors, energies [J], flips and stages of every piece
+  NAME.obj        the surface [m] with the pattern [m] as texture coordinates
+  frames.usdc     surface and pattern from the development to the end, coloured by energy
+  mannequin.usdc  of a garment on a body: that body, to which frames.usdc refers
+  picture.png     surface and pattern side by side, with a scale in J/m2
+  walked.png      of a garment on a body: both sides of every seam laid along each other
+  wear.png        where the scene has [wear]: strain when worn; of a mesh NAME.wear.png
+  review.html     all of it on one page, with the film; needs no network
+  NAME.dxf        the pattern for apparel CAD: cut and sewing lines, notches, grain; of several sizes with NAME.rul
+  NAME.svg        the same for screen and plotter, in millimetres
+  pattern.pdf     the same in true size, tiled on A4
+  pattern.json    everything of the pattern; warpflat export makes the others from it
+  NAME.marker.svg, NAME.marker.json
+                  where the scene has [marker]: the pieces on cloth; NAME.CLOTH.marker.* of every further cloth"""
 
 
 Command = Callable[..., Any]

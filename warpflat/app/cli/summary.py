@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from warpflat.app.cli.tables import cut_words
+from warpflat.app.review.figures import count_pieces
 from warpflat.core import energy_words, format_count
 from warpflat.garment import LACKING, NO_PATTERN
 
@@ -69,15 +70,8 @@ def summary_lines(
     cloth = ", ".join(dict.fromkeys(piece["fabric"] for piece in pieces.values()))
     area = sum(piece["area_m2"] for piece in pieces.values())
     energy = energy_words(sum(piece["strain_energy_j"] for piece in pieces.values()))
-    # With what was drafted beside them, such as collars and bands.
-    titles = {each["title"] for part in metrics.get("cloths", ()) for each in part["pieces"]}
-    what = (
-        [
-            f"{format_count(max(len(titles), len(pieces)), 'piece')}, {area:.3g} m2 laid out in {cloth}, strain energy {energy}"
-        ]
-        if pieces
-        else []
-    )
+    count = format_count(count_pieces(metrics), "pattern piece")
+    what = [f"{count}, {area:.3g} m2 laid out in {cloth}, strain energy {energy}"] if pieces else []
     what += [size] if size else []
     what += openings or (["it goes on without a further opening"] if metrics.get("rings") else [])
     lines.append("; ".join(what))

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
+from warpflat.app.review.figures import seam_figures
 from warpflat.core import aligned, energy_words
 from warpflat.flat import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_names
 
@@ -64,17 +65,9 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
     if relaxed := relaxation_words(piece["stages"] for piece in metrics["pieces"].values()):
         tables.append(f"relaxed: {relaxed}")
     if metrics.get("seams"):
-        columns = ("seam", "sides", "mm", "mm", "ease", "difference", "price")
+        columns = ("seam", "sides", "first", "second", "ease", "difference", "price")
         seams = [
-            (
-                seam["name"],
-                " = ".join(seam["sides"]),
-                *(f"{length:.1f}" for length in seam["length_mm"]),
-                f"{100 * seam['ease']:+.3g} %" if seam["ease"] else "",
-                # Without the sign of a negative zero.
-                f"{round(seam['difference_mm'], 2) + 0.0:+.2f} mm",
-                _price(seam["price_j"]),
-            )
+            (seam["name"], " = ".join(seam["sides"]), *seam_figures(seam), _price(seam["price_j"]))
             for seam in metrics["seams"]
         ]
         tables.append(aligned(columns, seams, left=(0, 1)))
@@ -87,7 +80,7 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
                 _price(seam["released_j"]) or seam["needed"] or "not tried",
                 ""
                 if seam["released_j"] is None
-                else f"{10 * seam['released_j'] / max(seam['length_m'], 1e-9):.3g} mJ/cm",
+                else f"{energy_words(seam['released_j'] / max(100 * seam['length_m'], 1e-9))}/cm",
             )
             for seam in found
         ]
@@ -220,7 +213,7 @@ def edit_table(edit: Mapping[str, Any]) -> str:
     """Return energies, strain and darts of a garment before and after an edit as text."""
     before, after = edit["before"], edit["after"]
     rows = [
-        (f"{words} energy", *(f"{1e3 * each[f'{words}_energy_j']:.4g} mJ" for each in (before, after)))
+        (f"{words} energy", *(energy_words(each[f"{words}_energy_j"]) for each in (before, after)))
         for words in ("strain", "model")
     ]
     rows.append(("beyond the limit", *(f"{100 * each['outside']:.1f} %" for each in (before, after))))

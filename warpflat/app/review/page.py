@@ -16,6 +16,7 @@ from typing import Any
 from urllib.parse import quote
 
 from warpflat.app.review.faults import faults_of
+from warpflat.app.review.figures import count_pieces, seam_figures
 from warpflat.app.review.film import open_film, pack_film, pack_foreign_film
 from warpflat.core import (
     InputError,
@@ -172,7 +173,9 @@ def _page(
     }
     images = []
     for file in sorted(shown, key=lambda file: (_FIRST.index(file) if file in _FIRST else len(_FIRST), file)):
-        words = shows.get(file, file.removesuffix(".png").replace("_", " ").replace(".", " "))
+        # Of a mesh it begins with the name of its piece.
+        kind = "wear.png" if file.endswith(".wear.png") else file
+        words = shows.get(kind, file.removesuffix(".png").replace("_", " ").replace(".", " "))
         images.append(_thumbnail(escape(words), shown[file]))
     drawings = []
     for file in sorted(file for file in files if file.endswith(".svg")):
@@ -277,7 +280,7 @@ def _film(packed: Mapping[str, Any]) -> str:
 def _cards(metrics: Mapping[str, Any]) -> str:
     """Return what one looks for first as HTML: energy, errors, cloth, pieces and fabric."""
     pieces = metrics["pieces"].values()
-    area = sum(piece["area_m2"] for piece in pieces)
+    area, count = sum(piece["area_m2"] for piece in pieces), count_pieces(metrics)
     fits = [piece["wear"] for piece in pieces if piece.get("wear")]
     stretch = max((each[f"strain_{way}"]["p95"] for each in fits for way in ("warp", "weft")), default=0.0)
     if stretch > STRETCHED and metrics.get("verdict", {}).get("fits"):
@@ -292,8 +295,8 @@ def _cards(metrics: Mapping[str, Any]) -> str:
     cards = [
         (energy_words(sum(piece["strain_energy_j"] for piece in pieces)), "strain energy"),
         *differs,
-        (f"{area:.3g} m²", "cloth"),
-        (str(len(metrics["pieces"])), "piece" if len(metrics["pieces"]) == 1 else "pieces"),
+        (f"{area:.3g} m²", "laid out"),
+        (str(count), "pattern piece" if count == 1 else "pattern pieces"),
         (", ".join(sorted({piece["fabric"] for piece in pieces})), "fabric"),
     ]
     if metrics.get("seams"):
@@ -339,7 +342,7 @@ def _typeset(words: str) -> str:
 
 
 def ease_table(metrics: Mapping[str, Any]) -> str:
-    """Return the girths of body and garment; empty where it goes around no body."""
+    """Return the girths of body and pattern; empty where it goes around no body."""
     rows = [
         (
             level,
@@ -350,7 +353,8 @@ def ease_table(metrics: Mapping[str, Any]) -> str:
         )
         for level, girth in (metrics.get("girths") or {}).items()
     ]
-    return _table(("level", "body", "garment", "ease", "asked for"), rows)
+    told = "<p>The pieces that were flattened, with darts and seams closed; cuffs and bands are not in it.</p>"
+    return _table(("level", "body", "pattern", "ease", "asked for"), rows) + (told if rows else "")
 
 
 def _bytes(path: Path) -> bytes:
@@ -403,18 +407,8 @@ def ledger_table(metrics: Metrics) -> str:
 
 def seam_table(metrics: Metrics) -> str:
     """Return every seam with its two lengths; empty if there is none."""
-    rows = [
-        (
-            seam["name"],
-            " + ".join(seam["sides"]),
-            f"{seam['length_mm'][0]:.1f} mm",
-            f"{seam['length_mm'][1]:.1f} mm",
-            f"{seam['difference_mm']:+.3f} mm",
-            f"{100 * seam['ease']:.1f} %",
-        )
-        for seam in metrics.get("seams") or ()
-    ]
-    return _table(("seam", "edges", "first", "second", "difference", "ease"), rows, text=2)
+    rows = [(seam["name"], " = ".join(seam["sides"]), *seam_figures(seam)) for seam in metrics.get("seams") or ()]
+    return _table(("seam", "sides", "first", "second", "ease", "difference"), rows, text=2)
 
 
 def size_table(metrics: Metrics) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,15 +20,14 @@ if TYPE_CHECKING:
 __all__ = ["drape_names", "drape_scene", "write_drape"]
 
 
-def drape_names(scene: Scene) -> list[str]:
-    """Return the files that a scene's drape will write, as far as they are known: without those of a form's pieces."""
-    settings, output, table = scene.settings, scene.settings.output, scene.settings.drape
+def drape_names(scene: Scene, pieces: Iterable[str]) -> list[str]:
+    """Return the files that a scene's drape will write, of pieces with these names."""
+    output, table = scene.settings.output, scene.settings.drape
     if table is None:
         return []
-    names = [f"{scene.name}.draped.obj"] if settings.mannequin is None else []
-    names += ["drape.png"] if output.picture else []
-    names += ["worn.usdc"] if table.usd else []
-    names += ["drape.webp"] if output.picture and output.frames > 0 else []
+    from warpflat.garment import files_of_drape
+
+    names = files_of_drape(pieces, picture=output.picture, frames=output.frames > 0, usd=table.usd)
     if table.correct or table.correct_fabric is not None:
         names += ["corrected.png"] if output.picture else []
         names += pattern_names(f"{scene.name}.corrected", _corrected_formats(scene))

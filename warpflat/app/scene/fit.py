@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.app.review.faults import is_done
-from warpflat.app.scene.load import make_scene, scene_fabric
+from warpflat.app.review.figures import count_pieces
+from warpflat.app.scene.load import errors_named, make_scene, scene_fabric
 from warpflat.app.scene.options import COMMAND_LINE, errors_of_options
 from warpflat.core import (
     FloatArray,
@@ -55,8 +56,6 @@ _BESIDE = 0.2
 _KEPT = 0.01
 # Cloth that lies so deep in the body [m] is within it; more than this share of it is told.
 _WITHIN, _TOLD = 0.002, 0.01
-# A curve in which a plane meets the cloth is a wrinkle below this share of the longest one.
-_WRINKLE = 0.05
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,2})?"
 _LENGTH = re.compile(rf"\s*(?P<level>[a-z]+)\s*=\s*(?P<value>{_NUMBER})\s*(?P<unit>mm|cm|m|in)\s*", re.ASCII)
 _UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
@@ -300,8 +299,8 @@ class FitJob:
         """
         from scipy.spatial import cKDTree
 
-        from warpflat.flat import plane_sections, triangulate
-        from warpflat.garment import Mesh
+        from warpflat.flat import triangulate
+        from warpflat.garment import Mesh, plane_curves
 
         layers = self.read.layers
         now = [
@@ -325,18 +324,15 @@ class FitJob:
             if plane is None:
                 found.append({key: moved(value) if key in ("points", "line") else value for key, value in cut.items()})
                 continue
-            point = np.asarray(plane["point"], dtype=float)
-            paths = [
-                (layer, path)
-                for layer, surface in enumerate(layers)
-                for path in plane_sections(surface, point, plane["normal"], towards=plane.get("towards"))
-            ]
-            if not paths:
-                raise InputError(f"{COMMAND_LINE}: seams_cut[{number}]: the plane misses the garment")
-            longest = max(path.length for _, path in paths)
+            with errors_named(f"{COMMAND_LINE}: seams_cut[{number}]"):
+                paths = plane_curves(
+                    layers,
+                    plane["point"],
+                    plane["normal"],
+                    towards=plane.get("towards"),
+                    nearest=plane.get("nearest", False),
+                )
             for layer, path in paths:
-                if path.length < _WRINKLE * longest:
-                    continue
                 places = [path.place(each) for each in range(len(path.points))]
                 line = [
                     sum(weight * now[layer][vertex] for vertex, weight in place.items()).tolist() for place in places
@@ -494,7 +490,7 @@ class Fitted:
             "body": self.carried.body,
             **{f"ease_{level}_mm": eases.get(level) for level in EASE_LEVELS},
             "kept": self.carried.kept()[1],
-            "pieces": len(pieces),
+            "pieces": count_pieces(self.metrics),
             "area_m2": area,
             "fits": self.fits,
             "done": is_done(self.metrics),

@@ -380,6 +380,7 @@ def drape_outside(
     from warpflat.garment import (
         Placement,
         drape_pattern,
+        files_of_drape,
         moved_outlines,
         relieve_pattern,
         write_drape_files,
@@ -390,7 +391,7 @@ def drape_outside(
     cloth, notes = _fabric(job, fabric)
     cloth = cloth.allowing(shear_limit)
     usd, correct = usd or table.usd, correct or table.correct
-    names = ["metrics.json", "drape.png", "drape.webp", "frames.usdc", *(["worn.usdc"] if usd else [])]
+    names = ["metrics.json", *files_of_drape([], picture=True, frames=True, usd=usd)]
     if correct:
         names += ["corrected.png", f"{job.name}.corrected.dxf", f"{job.name}.corrected.svg"]
     with output_folder(out, names, sources=job.sources, guard=True) as folder:

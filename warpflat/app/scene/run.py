@@ -124,7 +124,11 @@ def files_of_run(scene: Scene) -> list[str]:
         f"{scene.name}.wear.png": worn and not on_form,
         "walked.png": output.picture and on_form and bool(patterns),
     }
-    return [*(file for file, wanted in asked.items() if wanted), *patterns, *drape_names(scene)]
+    return [
+        *(file for file, wanted in asked.items() if wanted),
+        *patterns,
+        *drape_names(scene, [scene.name] if alone else []),
+    ]
 
 
 def _run(
@@ -145,7 +149,7 @@ def _run(
     filmed, body = output.frames > 0, plan.mannequin
     expect_files(folder, [f"{name}.obj" for name in names])
     expect_files(folder, [MANNEQUIN] if filmed and body is not None else [])
-    expect_files(folder, [f"{name}.draped.obj" for name in names] if settings.drape is not None else [])
+    expect_files(folder, drape_names(scene, names))
     require_memory_for_run(vertices, frames=filmed)
     others = plan.other_sizes()
 

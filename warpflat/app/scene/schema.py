@@ -19,10 +19,16 @@ from pydantic import (
 from warpflat.app.scene.first_shapes import PIECES
 from warpflat.core import Table, is_number, plain_name, quote_value
 from warpflat.flat import DEFAULT_FABRIC, AutoCutTable, FabricTable, RelaxOptions
-from warpflat.garment import Direction, FinishingTable, FormDart, MannequinTable, OpeningTable, PocketTable, SeamTable
-
-if TYPE_CHECKING:
-    from warpflat.garment import DrapeOptions
+from warpflat.garment import (
+    Direction,
+    DrapeOptions,
+    FinishingTable,
+    FormDart,
+    MannequinTable,
+    OpeningTable,
+    PocketTable,
+    SeamTable,
+)
 
 __all__ = [
     "PATH_KEYS",
@@ -343,12 +349,17 @@ class WearTable(Table):
     pressure: float | None = None
 
 
+def _bounds_of_drape(name: str) -> Any:
+    low, high = DrapeOptions.BOUNDS[name]
+    return Field(ge=low, le=high)
+
+
 class DrapeTable(Table):
     """The garment is sewn and put on its body (see `warpflat.drape`)."""
 
-    friction: Annotated[float, Field(ge=0, le=2)] = 0.3
-    tolerance: Annotated[float, Field(ge=1e-6, le=1)] = 5e-3
-    max_steps: Annotated[int, Field(ge=1, le=10_000_000)] = 20_000
+    friction: Annotated[float, _bounds_of_drape("friction")] = DrapeOptions.friction
+    tolerance: Annotated[float, _bounds_of_drape("tolerance")] = DrapeOptions.tolerance
+    max_steps: Annotated[int, _bounds_of_drape("max_steps")] = DrapeOptions.max_steps
     hold: list[str] = Field(default_factory=list)
     """Lines and edges that stay where they are: "piece.line", or "line" for every piece that has one."""
     correct: bool = False
@@ -360,8 +371,6 @@ class DrapeTable(Table):
 
     def options(self) -> DrapeOptions:
         """Return how the garment comes to rest."""
-        from warpflat.garment import DrapeOptions
-
         return DrapeOptions(friction=self.friction, tolerance=self.tolerance, max_steps=self.max_steps)
 
 

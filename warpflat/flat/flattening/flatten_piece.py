@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import dijkstra
 from warpflat.core.arrays import IntArray
 from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError, expect, expect_callback, nearest
+from warpflat.core.text import area_words
 from warpflat.flat.fabric.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.flat.fabric.library import as_fabric
 from warpflat.flat.flattening.datum import resolve_datum
@@ -293,6 +294,6 @@ def nearly_closed_notes(surface: Surface) -> list[str]:
     tip = int(away.argmax())
     first, last = (int(surface.input_index[vertex]) for vertex in (source[tip], tip))
     return [
-        f"the piece is nearly closed: its border of {100 * border:.1f} cm is too short to lie flat around {1e4 * area:.0f} cm2; a cut "
+        f"the piece is nearly closed: its border of {100 * border:.1f} cm is too short to lie flat around {area_words(area)}; a cut "
         f"of {100 * away[tip]:.1f} cm from vertex {first} to vertex {last} would make a pattern of it"
     ]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.text import format_count
+from warpflat.core.text import area_words, format_count
 from warpflat.flat.model.network import SpringNetwork
 from warpflat.flat.model.strain import face_areas
 
@@ -46,8 +46,8 @@ class StretchedFaces:
         """Return a warning about the faces, with what may help."""
         body, flat = ", ".join(f"{100 * x:.1f}" for x in self.at), ", ".join(f"{1e3 * x:.0f}" for x in self.in_pattern)
         return (
-            f"{format_count(self.faces, 'face')} of {1e4 * self.area_m2:.3g} cm2 on the body take up "
-            f"{1e4 * self.flat_area_m2:.3g} cm2 of the pattern: face {self.face} around ({body}) cm, "
+            f"{format_count(self.faces, 'face')} of {area_words(self.area_m2)} on the body take up "
+            f"{area_words(self.flat_area_m2)} of the pattern: face {self.face} around ({body}) cm, "
             f"in the pattern ({flat}) mm, {self.times:.3g} times its area; the cloth would have to shear so far "
             f"there: make a dart or a seam, or take a fabric that shears less"
         )

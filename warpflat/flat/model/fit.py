@@ -18,6 +18,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.short_repr import short_repr
 from warpflat.core.sorting import counting_sort
 from warpflat.core.sums import weighted_percentiles
+from warpflat.core.text import area_words
 from warpflat.flat.fabric.fabric import Fabric
 from warpflat.flat.fabric.limits import Amount, Demand
 from warpflat.flat.model.network import SpringNetwork
@@ -76,7 +77,7 @@ class Misfit:
         worst = self.worst
         return (
             f"{worst.state} {worst.words} (limit {worst.limit_words}), {place_in_words(self.surface, self.vertex)}; "
-            f"{1e4 * self.area:.3g} cm2 beyond the limit"
+            f"{area_words(self.area)} beyond the limit"
         )
 
     @cached_property

@@ -37,6 +37,7 @@ __all__ = [
     "spring_geometry",
     "springs_along_cells",
     "springs_of",
+    "stretch_factor",
     "with_stiffness",
 ]
 
@@ -284,11 +285,20 @@ def shorten_springs(
         ],
         axis=1,
     )
-    d = positions[springs.ends[:, 1]] - positions[springs.ends[:, 0]]
-    length = np.linalg.norm(d, axis=1)
-    u = np.stack([d @ axes[0], d @ axes[1]], axis=1) / np.where(length > 0.0, length, 1.0)[:, None]
-    worn = np.linalg.norm(u * 0.5 * (at_vertex[springs.ends[:, 0]] + at_vertex[springs.ends[:, 1]]), axis=1)
-    return replace(springs, listed_length=springs.listed(springs.rest_length / np.where(worn > 0.0, worn, 1.0)))
+    along = (positions[springs.ends[:, 1]] - positions[springs.ends[:, 0]]) @ np.column_stack(axes)
+    worn = stretch_factor(along, 0.5 * (at_vertex[springs.ends[:, 0]] + at_vertex[springs.ends[:, 1]]))
+    return replace(springs, listed_length=springs.listed(springs.rest_length / worn))
+
+
+def stretch_factor(vectors: FloatArray, times: FloatArray) -> FloatArray:
+    """Return how many times longer vectors along warp and weft (#N by 2) become once each component is so many times longer (#N by 2).
+
+    A vector of no length has no direction, and stays as it is: 1.
+    """
+    length = np.linalg.norm(vectors, axis=1)
+    has_length = length > 0.0
+    longer = np.linalg.norm(vectors * times, axis=1) / np.where(has_length, length, 1.0)
+    return np.asarray(np.where(has_length, longer, 1.0))
 
 
 def springs_along_cells(springs: SpringGeometry, cells: CellArrays) -> IntArray:

@@ -30,6 +30,7 @@ from warpflat.flat import (
     relax_under_equations,
     springs_of,
     step_matrix,
+    stretch_factor,
     with_stiffness,
 )
 
@@ -132,12 +133,10 @@ def measure_fullness(piece: Flattening, edges: Sequence[FullEdge], plain: Sequen
         wanted.append((edge.vertices, edge.factor if edge.gathered else max(1.0, edge.factor / max(1.0, longer))))
     full, lacks = np.exp(log_full), []
     for ids, factor in wanted:
-        step = np.diff(positions[ids], axis=0)
-        across = np.stack([step @ axes[0], step @ axes[1]], axis=1)
+        across = np.diff(positions[ids], axis=0) @ np.column_stack(axes)
         here = 0.5 * (full[ids[1:]] + full[ids[:-1]])
-        length = np.maximum(np.linalg.norm(step, axis=1), np.finfo(np.float64).tiny)
         # The log of what is still missing of the factor, at each of the edge's vertices.
-        lack = np.log(factor * length / np.linalg.norm(across * here, axis=1))
+        lack = np.log(factor / stretch_factor(across, here))
         lacks.append((ids, 0.5 * (np.append(lack, lack[-1]) + np.append(lack[0], lack))))
     log_full += falloff_weights(faces, lacks, border_loops(faces), len(positions))[:, None]
     return np.asarray(np.exp(log_full))
@@ -161,17 +160,11 @@ def _wider_springs(
     springs, surface = network.spring_arrays, network.surface
     before = (positions[springs.ends[:, 1]] - positions[springs.ends[:, 0]]) @ np.column_stack(axes)
     here = 0.5 * (full[springs.ends[:, 0]] + full[springs.ends[:, 1]])
-    longer = springs.listed(springs.rest_length * _stretch_factor(before, here))
+    longer = springs.listed(springs.rest_length * stretch_factor(before, here))
     if weighed:
         # By what factors a quad's first edges and its others become longer.
         of_quad, q = full[surface.faces].mean(axis=1), positions[surface.faces] @ np.column_stack(axes)
         sides = q[:, 1] - q[:, 0] + q[:, 2] - q[:, 3], q[:, 2] - q[:, 1] + q[:, 3] - q[:, 0]
-        wider = np.column_stack([_stretch_factor(side, of_quad) for side in sides])
+        wider = np.column_stack([stretch_factor(side, of_quad) for side in sides])
         springs = springs_of(surface, network.fabric, positions, grain_angle=network.grain_angle, wider=wider)
     return replace(springs, listed_length=longer)
-
-
-def _stretch_factor(vector: FloatArray, full: FloatArray) -> FloatArray:
-    """Return by what factor a vector (along warp and weft) becomes longer once each component has its own factor."""
-    length = np.maximum(np.linalg.norm(vector, axis=1), np.finfo(np.float64).tiny)
-    return np.asarray(np.linalg.norm(vector * full, axis=1) / length)

@@ -11,14 +11,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core import FloatArray, IntArray, arc_lengths, other_side, points_at_lengths, unit, without_side
+from warpflat.core import (
+    FloatArray,
+    IntArray,
+    arc_lengths,
+    line_name,
+    other_side,
+    points_at_lengths,
+    unit,
+    without_side,
+)
 from warpflat.flat import area_vectors, border_loops, judge, triangulate, vertex_normals
 from warpflat.garment.construction.button_stand import button_depths
 from warpflat.garment.construction.drawn_finishing import Rises, finishing_views, lost_along
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.mark_openings import TIE_WIDTH
 from warpflat.garment.construction.openings import place_opening
-from warpflat.pattern import ClothKind, Measure, NeededOpening, Piece, ViewedPiece, Worn
+from warpflat.pattern import ClothKind, Measure, NeededOpening, Pattern, Piece, ViewedPiece, Worn
 
 if TYPE_CHECKING:
     from warpflat.flat import Flattening
@@ -47,7 +56,7 @@ _CIRCLE = np.column_stack([f(np.linspace(0.0, 2.0 * np.pi, 17)) for f in (np.cos
 
 
 def describe_worn(
-    garments: Mapping[str, Garment], sample: str, rises: Rises = MappingProxyType({}), pieces: Sequence[Piece] = ()
+    garments: Mapping[str, Garment], sample: str, rises: Rises = MappingProxyType({}), pattern: Pattern | None = None
 ) -> Worn:
     """Return the line drawing of a garment in its sample size, the measures of all sizes, and the openings that it needs.
 
@@ -55,7 +64,7 @@ def describe_worn(
         garments: flattened, by size, on their bodies.
         sample: the size that is drawn.
         rises: of its slanted hems.
-        pieces: of the pattern in that size, on which places of pockets are marked.
+        pattern: of the garment, on which places of pockets are marked, and whose cuffs and bands draw it in.
     """
     garment = garments[sample]
     cloth, on_form = list(garment.pieces.values()), garment if isinstance(garment, FormGarment) else None
@@ -71,23 +80,23 @@ def describe_worn(
             seen = [_without_lost_strips(on_form, *each, sign, rises) for each in zip(names, seen, strict=True)]
             behind, before = finishing_views(on_form, sign, rises)
             seen = [*behind, *_wrapped(on_form, seen, names, sign), *before, *_openings(on_form, sign)]
-            seen += _pockets(on_form, pieces, sign)
+            seen += _pockets(on_form, () if pattern is None else pattern.pieces[sample], sign)
         views[name] = tuple(piece for piece in seen if piece.outlines or piece.lines)
-    measures = {
-        size: tuple(
-            Measure(
-                name=without_side(level),
-                body=girth["body_m"],
-                finished=girth["pattern_m"],
-                asked=girth.get("ease_wanted_m"),
-            )
-            for level, girth in each.girths.items()
+    measures = {}
+    for size, each in garments.items():
+        found, bands = list[Measure](), {} if pattern is None else _bands(pattern, size)
+        for level, girth in (each.girths or {}).items():
             # Arms and legs are told once.
-            if not (level.endswith(" right") and other_side(level) in each.girths)
-        )
-        for size, each in garments.items()
-        if each.girths
-    }
+            if level.endswith(" right") and other_side(level) in each.girths:
+                continue
+            name, asked = without_side(level), girth.get("ease_wanted_m")
+            finished = bands.get(name, girth["pattern_m"])
+            # The ease that was asked for is that of the cloth, not of the band that draws it in.
+            found.append(
+                Measure(name=name, body=girth["body_m"], finished=finished, asked=None if name in bands else asked)
+            )
+        if found:
+            measures[size] = tuple(found)
     needed = tuple(
         NeededOpening(
             ring=ring.name, length=ring.length, over=ring.over, girth=ring.girth, depth=ring.opening_needed_mm / 1000
@@ -224,6 +233,28 @@ def _openings(garment: FormGarment, sign: float) -> Iterator[ViewedPiece]:
                     lines.append(shape + [np.interp(at, arc, seen[:, axis]) for axis in (0, 1)])
         if lines:
             yield ViewedPiece(outlines=(), lines=tuple(lines))
+
+
+def _bands(pattern: Pattern, size: str) -> dict[str, float]:
+    """Return by line of the body the length [m] of the cuff or band that a garment ends in there, and that draws it in."""
+    found = dict[str, float]()
+    for seam in pattern.seams:
+        for own, other in (seam.sides, seam.sides[::-1]):
+            band, shell = ([pattern.piece(side.piece, size) for side in row] for row in (own, other))
+            if any(piece.on_fold for piece in shell) or {piece.role for piece in shell} != {"shell"}:
+                continue
+            lengths = [
+                sum(piece.edge(side.edge).length for piece, side in zip(pieces, row, strict=True))
+                for pieces, row in ((band, own), (shell, other))
+            ]
+            lines = {line_name(side.edge) for side in other}
+            if (
+                all(piece.role in ("strip", "cuff") for piece in band)
+                and lengths[0] < lengths[1] - 1e-3
+                and len(lines) == 1
+            ):
+                found[lines.pop()] = lengths[0]
+    return found
 
 
 def _pockets(garment: FormGarment, pieces: Sequence[Piece], sign: float) -> Iterator[ViewedPiece]:

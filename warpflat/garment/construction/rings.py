@@ -173,7 +173,7 @@ def ring_line(mannequin: Mannequin, ring: IntArray) -> str:
 def rings_line(rings: Sequence[Mapping[str, Any]]) -> str:
     """Return the console's line about the entry `rings` of `metrics.json`."""
     shut = [
-        f"{ring['name']} {ring['opening_needed_mm']:.0f} mm ({ring['length_mm']:.0f} < {ring['over']} {ring['girth_mm']:.0f})"
+        f"{ring['name']} {ring['opening_needed_mm'] / 10:g} cm ({ring['length_mm'] / 10:.1f} < {ring['over']} {ring['girth_mm'] / 10:.1f})"
         for ring in rings
         if ring["passes"] is False
     ]

@@ -215,7 +215,7 @@ def pattern_of_garment(
         pattern = with_pieces(pattern, curved)
     if laid:
         with optional_step(_NO_DRAWING, is_needed=False):
-            worn = describe_worn(laid, pattern.sample, rises, pattern.pieces[pattern.sample])
+            worn = describe_worn(laid, pattern.sample, rises, pattern)
             pattern = replace(pattern, worn=worn)
     return pattern, notes
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 from warpflat.core import InputError, is_number
 
@@ -28,12 +30,15 @@ class DrapeOptions:
     max_steps: int = 20_000
     gravity: float = 9.80665
 
+    #: Least and largest value of each; a scene's `[drape]` has the same.
+    BOUNDS: ClassVar[Mapping[str, tuple[float, float]]] = {
+        "friction": (0, 2), "compression": (0.001, 1), "tolerance": (1e-6, 1), "max_steps": (1, 10_000_000),
+        "gravity": (0.1, 100),
+    }  # fmt: skip
+
     def __post_init__(self) -> None:
-        bounds = {
-            "friction": (0.0, 2.0), "compression": (0.001, 1.0), "tolerance": (1e-6, 1.0), "max_steps": (1, 10_000_000),
-            "gravity": (0.1, 100.0),
-        }  # fmt: skip
-        for name, (lowest, highest) in bounds.items():
-            value = getattr(self, name)
-            if not is_number(value) or not lowest <= value <= highest:
-                raise InputError(f"drape: {name} = {value!r}; must be a number between {lowest:g} and {highest:g}")
+        for name, (lowest, highest) in self.BOUNDS.items():
+            value, whole = getattr(self, name), name == "max_steps"
+            if not is_number(value, whole=whole) or not lowest <= value <= highest:
+                kind = "whole number" if whole else "number"
+                raise InputError(f"drape: {name} = {value!r}; must be a {kind} between {lowest:g} and {highest:g}")

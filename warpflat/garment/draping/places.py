@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core import BoolArray, FloatArray, IntArray
+from warpflat.core import BoolArray, FloatArray, IntArray, area_words
 from warpflat.flat import Demand, border_edges, join_labels, triangulate
 from warpflat.garment.draping.sewn_cloth import SewnCloth
 
 __all__ = ["Place", "find_places"]
 
+# A place goes on into another piece if so large a share of it lies there.
+_SPREADS = 0.1
 # From here on a distance is worth a sentence [m], and a place its own one [m2].
 _WORTH, _LEAST_AREA = 3e-3, 2e-4
 _MOST = 6
@@ -86,9 +88,13 @@ def find_places(
         line = _line_at(cloth, worst)
         piece, _, near = line.partition(".")
         called = f"{piece.replace('_', ' ')} near {near}" if near else "the cloth"
+        # The area of a place that goes on into other pieces is not that of the one that is named.
+        share = {name: np.isin(cloth.welded[rows], part).sum() for name, rows in cloth.piece_vertices.items()}
+        over = [name.replace("_", " ") for name, count in share.items() if count > _SPREADS * sum(share.values())]
+        of = f" of {' and '.join(over)}" if len(over) > 1 else ""
         place = Place(
             kind=kind, line=line, worst=amount, gap=float(gap[worst]), area=area,
-            words=f"{called} {words} over {1e4 * area:.0f} cm2", vertex=worst, gapes=gapes,
+            words=f"{called} {words} over {area_words(area)}{of}", vertex=worst, gapes=gapes,
         )  # fmt: skip
         found.append(place)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,13 @@ from warpflat.garment.draping.result import Drape
 from warpflat.garment.draping.sewn_cloth import worn_surface
 from warpflat.pattern import write_obj, write_sewn_usd
 
-__all__ = ["save_drape", "write_drape_files"]
+__all__ = ["files_of_drape", "save_drape", "write_drape_files"]
+
+
+def files_of_drape(pieces: Iterable[str], *, picture: bool, frames: bool, usd: bool) -> list[str]:
+    """Return the names of the files that :func:`write_drape_files` writes for pieces, if no picture or film is left out."""
+    shared = {"worn.usdc": usd, "drape.png": picture, "frames.usdc": frames, "drape.webp": picture and frames}
+    return [*(f"{piece}.draped.obj" for piece in pieces), *(file for file, wanted in shared.items() if wanted)]
 
 
 def save_drape(
@@ -30,8 +37,7 @@ def save_drape(
     Raises:
         InputError: the folder cannot be written.
     """
-    names = [*(["drape.png"] if picture else []), *(["drape.webp"] if picture and frames else [])]
-    names += [*(["frames.usdc"] if frames else []), *(["worn.usdc"] if usd else [])]
+    names = files_of_drape(drape.cloth.piece_vertices, picture=picture, frames=frames, usd=usd)
     with output_folder(folder, names, sources=drape.sources) as to:
         return write_drape_files(drape, to, picture=picture, frames=frames, usd=usd)
 

@@ -8,12 +8,15 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from warpflat.core import FloatArray, unit
+from warpflat.core import FloatArray, IntArray, unit
+from warpflat.garment.mannequin.body_landmarks import ARM_PLACES, model_places, near_level, near_place, value_at
+from warpflat.garment.mannequin.body_model import finer_body
 from warpflat.garment.mannequin.bricks import TRUNK_LEVELS
+from warpflat.garment.mannequin.head import head_of
 from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS
-from warpflat.garment.mannequin.picture import body_views
-from warpflat.pattern import GREY, SKIN, draw_row, drawn_page
+from warpflat.pattern import GREY, SKIN, Facets, View, draw_row, drawn_page
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.mannequin import Mannequin
@@ -46,7 +49,7 @@ _HOW: Mapping[str, str] = {
     "knee_girth": "around one knee",
     "calf_girth": "around one calf, where it is widest",
     "ankle_girth": "around one ankle, above the bone",
-    "foot": "around heel and instep",
+    "foot": "around the ball, where it is broadest",
 }
 #: By measurement the line of the body on which it lies; lengths run between two heights of a line.
 _LINES = {
@@ -59,6 +62,7 @@ _BEHIND = ("back_width", "armscye_depth", "nape_to_waist")
 _PAGE = (8.27, 11.69)  # [in], A4
 _LINE = "#9c1f30"
 _HEIGHT, _TOP = 5.0, 10.75  # of the figures, and where they begin [in]
+_INTO_LIMB = 0.012  # hands and feet reach so far into arms and legs, of the stature
 
 
 def needed_measurements(bands: Collection[tuple[str, str]], *, hood: bool = False) -> list[str]:
@@ -125,24 +129,24 @@ def write_measurement_card(
         pen.write(0.5, 11.3, title, 15, fontweight="bold")
         pen.write(0.5, 11.03, "Measure over underwear, the tape snug and level, standing upright.", 9.5, color=GREY)
         number = {name: k for k, name in enumerate(needed, start=1)}
-        views, shades = (
-            body_views(mannequin, (("", 0.0), (" ", 180.0))),
-            np.tile(SKIN, (len(mannequin.layout.body_faces), 1)),
-        )
-        # From the floor to the crown, though the body has neither feet nor a head.
-        wide, scale = float(views[""].size[0]), _HEIGHT / mannequin.lengths["stature"]
+        vertices, faces, tapes = _with_ends(mannequin)
+        views = View.around(vertices, Facets.of(faces, np.empty((0, 2), dtype=np.int32)), (("", 0.0), (" ", 180.0)))
+        wide, tall, _ = views[""].size
+        scale, shades = _HEIGHT / tall, np.tile(SKIN, (len(faces), 1))
         gap = 0.5 * _PAGE[0] - wide * scale
-        bottom = _TOP - _HEIGHT + scale * float(views[""].low[1])
-        bodies = draw_row(pen, views, [shades] * 2, left=0.5 * gap, bottom=bottom, inches_per_metre=scale, gap=gap)
-        beyond = _beyond(mannequin)
+        bodies = draw_row(
+            pen, views, [shades] * 2, left=0.5 * gap, bottom=_TOP - _HEIGHT, inches_per_metre=scale, gap=gap
+        )
+        # Stature is measured beside the body, to its left.
+        aside = float(views[""].low[0] + wide) + 0.03
+        tapes["stature"] = np.array([(aside, share * mannequin.lengths["stature"], 0.0) for share in (0.0, 0.5, 1.0)])
+        tapes |= {name: _tape(mannequin, name) for name in needed if name not in tapes}
         for drawn, is_behind in zip(bodies, (False, True), strict=True):
             view, names = drawn.view, [name for name in needed if (name in _BEHIND) is is_behind]
-            for name in [name for name in names if name in beyond]:
-                pen.line(drawn.to_page(beyond[name][0] @ view.directions.T), width=0.7, colour=GREY)
-            tapes = {name: drawn.to_page(_tape(mannequin, name) @ view.directions.T) for name in names}
-            for line in tapes.values():
+            lines = {name: drawn.to_page(tapes[name] @ view.directions.T) for name in names}
+            for line in lines.values():
                 pen.line(line, width=1.6, colour=_LINE, halo=True)
-            for name, line in tapes.items():
+            for name, line in lines.items():
                 # A number lies on its tape: in the middle of a girth, half-way along a length, but where another one lies there.
                 at = {"bust_points": 0, "arm_length": 2 * len(line) // 3}
                 closed = np.allclose(line[0], line[-1])
@@ -167,24 +171,41 @@ def write_measurement_card(
             pen.write(0.5, 0.28, words, 8.5, color=GREY, fontstyle="italic")
 
 
-def _beyond(mannequin: Mannequin) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Return outlines of what the body lacks and is measured, head, hand and foot, and the tapes around them (#P by 3 [m] each)."""
-    lines, at, tall = mannequin.layout.lines, mannequin.vertices, mannequin.lengths["stature"]
-    elbow, wrist, ankle = (at[lines[name]].mean(axis=0) for name in ("elbow left", "wrist left", "ankle left"))
-    along, up = unit(wrist - elbow), np.array([0.0, 1.0, 0.0])
-    # Their middles, half of their lengths and widths, and how far the tape lies beyond the middle.
-    shapes = {
-        "head": (up * 0.935 * tall, 0.065 * tall * up, 0.046 * tall, 0.3),
-        "hand": (wrist + 0.05 * tall * along, 0.05 * tall * along, 0.022 * tall, 0.2),
-        "foot": (ankle * [1.0, 0.5, 1.0], 0.5 * ankle * up, 0.026 * tall, 0.0),
-    }
-    turn, found = np.linspace(0.0, 2.0 * np.pi, 49), {}
-    for name, (middle, reach, half, off) in shapes.items():
-        across = half * unit(np.array([reach[1], -reach[0], 0.0]))
-        around = middle + np.outer(np.cos(turn), reach) + np.outer(np.sin(turn), across)
-        wide = np.sqrt(1.0 - off**2)
-        found[name] = around, middle + off * reach + np.outer([-wide, 0.0, wide], across)
-    return found
+def _with_ends(mannequin: Mannequin) -> tuple[FloatArray, IntArray, dict[str, FloatArray]]:
+    """Return a body with head, hands and feet, which it lacks and is measured around.
+
+    The head is that on which a hood is worn, hands and feet are those of the mean body model, as large as the person is tall.
+
+    Returns:
+        Vertices (#V by 3 [m]), faces (#F by 4), and by measurement the tape across where the end is widest (3 by 3 [m]).
+    """
+    from scipy.spatial.transform import Rotation
+
+    head, tall = head_of(mannequin), mannequin.lengths["stature"]
+    assert head is not None, "every size table has a head"
+    places, triangles, sideways = model_places(), finer_body()[1].astype(np.int32), np.array([1.0, 0.0, 0.0])
+    ends: list[tuple[str, FloatArray, IntArray, NDArray[np.int64], FloatArray]]
+    ends = [("head", *head, np.arange(len(head[0])), sideways)]
+    for side in ("right", "left"):
+        elbow, wrist = (value_at(near_place(ARM_PLACES[name], side), places.mean) for name in ("elbow", "wrist"))
+        along = mannequin.line(f"wrist {side}").mean(axis=0) - mannequin.line(f"elbow {side}").mean(axis=0)
+        turn = Rotation.align_vectors([along], [wrist - elbow])[0].as_matrix()
+        hand = tall * (places.mean - wrist) @ turn.T + mannequin.line(f"wrist {side}").mean(axis=0)
+        rows = places.strips[f"arm {side}"] & (places.along > ARM_PLACES["wrist"] - _INTO_LIMB)
+        measured, across = near_place(ARM_PLACES["hand"], side)[0], unit(np.cross(along, [0.0, 0.0, 1.0]))
+        ends.append(("hand", hand, triangles[rows[triangles].all(axis=1)], measured, across))
+        ankle, joint = value_at(near_level("ankle", side), places.mean), mannequin.line(f"ankle {side}").mean(axis=0)
+        foot = (places.mean - ankle) * [tall, joint[1] / ankle[1], tall] + joint
+        rows = places.strips[f"leg {side}"] & (places.mean[:, 1] < ankle[1] + _INTO_LIMB)
+        ends.append(("foot", foot, triangles[rows[triangles].all(axis=1)], near_level("foot", side)[0], sideways))
+    vertices, faces, tapes = [mannequin.vertices], [mannequin.layout.body_faces], dict[str, FloatArray]()
+    for name, points, corners, measured, across in ends:
+        place = points[measured] @ across
+        low, high = points[measured[np.argmin(place)]], points[measured[np.argmax(place)]]
+        tapes[name] = np.array([low, 0.5 * (low + high), high])
+        faces.append(np.column_stack([corners + sum(map(len, vertices)), np.full(len(corners), -1)]))
+        vertices.append(points)
+    return np.concatenate(vertices), np.concatenate(faces).astype(np.int32), tapes
 
 
 def _tape(mannequin: Mannequin, name: str) -> FloatArray:
@@ -199,8 +220,4 @@ def _tape(mannequin: Mannequin, name: str) -> FloatArray:
     if name == "bust_points":
         row = layout.rings[layout.level_row["bust"]]
         return at[row[np.arange(-layout.to_princess, layout.to_princess + 1) % len(row)]]
-    if name == "stature":
-        # Beside the body, to its right.
-        aside = float(at[layout.body_faces.ravel(), 0].min()) - 0.03
-        return np.array([(aside, share * mannequin.lengths["stature"], 0.0) for share in (0.0, 0.5, 1.0)])
-    return at[layout.lines[_LINES[name]]] if name in _LINES else _beyond(mannequin)[name][1]
+    return at[layout.lines[_LINES[name]]]

@@ -31,7 +31,7 @@ from warpflat.pattern import (
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.mannequin import Mannequin
 
-__all__ = ["body_views", "signed_distances", "write_distance_picture", "write_mannequin_picture"]
+__all__ = ["signed_distances", "write_distance_picture", "write_mannequin_picture"]
 
 # The side comes last: its names stand beyond it.
 _VIEWS = (("front", 0.0), ("three-quarter", 38.0), ("back", 180.0), ("left side", 90.0))
@@ -43,7 +43,7 @@ _FACING = 0.12
 _SCALE = 15.0
 
 
-def body_views(mannequin: Mannequin, sides: Iterable[tuple[str, float]]) -> dict[str, View]:
+def _body_views(mannequin: Mannequin, sides: Iterable[tuple[str, float]]) -> dict[str, View]:
     """Return views of a mannequin without its mesh by title, from some sides [degrees]."""
     facets = Facets.of(mannequin.layout.body_faces, np.empty((0, 2), dtype=np.int32))
     return View.around(mannequin.vertices, facets, sides)
@@ -55,7 +55,7 @@ def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) 
     Raises:
         InputError: if the file cannot be written.
     """
-    faces, views = mannequin.layout.body_faces, body_views(mannequin, _VIEWS)
+    faces, views = mannequin.layout.body_faces, _body_views(mannequin, _VIEWS)
     wide, high = row_size(views)
     scale = 0.87 * _HEIGHT / high
     with drawn_page(path, scale * wide + _GAP * len(views) + _NAMES, _HEIGHT) as pen:
@@ -138,4 +138,4 @@ def write_distance_picture(mannequin: Mannequin, path: str | os.PathLike[str]) -
     scale, far = Scale(low=-_SCALE, high=_SCALE, colours="RdBu"), np.abs(distance)
     near = f"half of it within {np.median(far):.1f} mm, 95 % within {np.quantile(far, 0.95):.1f} mm"
     map_of = {f"mannequin inside (-) or outside (+) the scan [mm]; {near}": (scale, [scale.rgb(distance)] * len(SIDES))}
-    write_maps(path, f"Distance to the {mannequin.source}", body_views(mannequin, SIDES), map_of, tallest=_HEIGHT)
+    write_maps(path, f"Distance to the {mannequin.source}", _body_views(mannequin, SIDES), map_of, tallest=_HEIGHT)

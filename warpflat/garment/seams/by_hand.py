@@ -11,9 +11,9 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from warpflat.core import FloatArray, InputError, arc_lengths, points_at_lengths, project_on_segments, quote_value
+from warpflat.core import FloatArray, InputError, arc_lengths, points_at_lengths, project_on_segments, quote_value, unit
 from warpflat.flat import Surface, SurfacePath, are_joined, geodesic_path, locate, plane_sections, polyline_path
 from warpflat.garment.seams.anatomy import FROM_SHOULDERS, TAILORED, Anatomy
 from warpflat.garment.seams.cloth import LEVELS, Cloth, are_among, edge_components, section
@@ -21,7 +21,7 @@ from warpflat.garment.seams.options import SeamCut, SeamOptions, in_family
 from warpflat.garment.seams.symmetric import SAME_PLACE
 from warpflat.garment.seams.tailor import BESIDE, LEFT, centre_lines
 
-__all__ = ["HAND", "cut_by_hand", "join_ends", "keep_seams", "leave_to_hand", "level_of"]
+__all__ = ["HAND", "cut_by_hand", "join_ends", "keep_seams", "leave_to_hand", "level_of", "plane_curves"]
 
 Ids = NDArray[np.int64]
 
@@ -82,6 +82,40 @@ def cut_by_hand(
     return made, [f"{where} {words}: it is left out" for where in idle]
 
 
+def plane_curves(
+    layers: Sequence[Surface], point: ArrayLike, normal: ArrayLike, *, towards: ArrayLike | None, nearest: bool
+) -> list[tuple[int, SurfacePath]]:
+    """Return the curves along which a plane cuts a garment, each with the number of its layer, without those of mere wrinkles.
+
+    Args:
+        layers: of the garment.
+        point, normal: of the plane [m].
+        towards: if given, only the half of the plane that lies in this direction from the point.
+        nearest: whether only the curve nearest to the point is cut.
+
+    Raises:
+        InputError: the plane misses the garment.
+    """
+    origin, axis = np.asarray(point, dtype=float), unit(np.asarray(normal, dtype=float))
+    found = [
+        (layer, path)
+        for layer, surface in enumerate(layers)
+        for path in plane_sections(surface, origin, axis, towards=towards)
+    ]
+    if not found:
+        reach = np.concatenate([surface.vertices for surface in layers]) @ axis
+        side = "" if towards is None or not reach.min() <= origin @ axis <= reach.max() else " in that direction"
+        raise InputError(
+            f"the plane misses the garment{side}: along its normal that spans {reach.min():.4g} to {reach.max():.4g} m, and the plane "
+            f"lies at {origin @ axis:.4g} m"
+        )
+    longest = max(path.length for _, path in found)
+    found = [(layer, path) for layer, path in found if path.length >= _WRINKLE * longest]
+    if not nearest:
+        return found
+    return [min(found, key=lambda one: float(np.linalg.norm(one[1].points - origin, axis=1).min()))]
+
+
 def _paths(
     cloths: Sequence[Cloth], surfaces: Sequence[Surface], cut: SeamCut
 ) -> Iterator[tuple[int, SurfacePath | Ids]]:
@@ -102,24 +136,11 @@ def _paths(
             yield layer, cloths[layer].new_edges(np.unique(np.sort(edges, axis=1), axis=0))
         return
     if cut.plane is not None:
-        point, normal = (np.asarray(value, dtype=float) for value in cut.plane)
-        found = [
-            (layer, path.points.mean(axis=0), path.length, float(np.linalg.norm(path.points - point, axis=1).min()))
-            for layer, cloth in enumerate(cloths)
-            for path in plane_sections(cloth.as_surface(), point, normal, towards=cut.towards)
-        ]
-        if not found:
-            axis = normal / np.linalg.norm(normal)
-            reach = np.concatenate([cloth.vertices for cloth in cloths]) @ axis
-            side = "" if cut.towards is None or not reach.min() <= point @ axis <= reach.max() else " in that direction"
-            raise InputError(
-                f"the plane misses the garment{side}: along its normal that spans {reach.min():.4g} to {reach.max():.4g} m, and the plane "
-                f"lies at {point @ axis:.4g} m"
-            )
-        longest = max(length for _, _, length, _ in found)
-        found = [one for one in found if one[2] >= _WRINKLE * longest]
-        for layer, middle, _, _ in [min(found, key=lambda one: one[3])] if cut.nearest else found:
-            now = plane_sections(cloths[layer].as_surface(), point, normal, towards=cut.towards)
+        origin, normal = cut.plane
+        uncut = [cloth.as_surface() for cloth in cloths]
+        for layer, found in plane_curves(uncut, origin, normal, towards=cut.towards, nearest=cut.nearest):
+            middle = found.points.mean(axis=0)
+            now = plane_sections(cloths[layer].as_surface(), origin, normal, towards=cut.towards)
             yield layer, min(now, key=lambda path: float(np.linalg.norm(path.points.mean(axis=0) - middle)))
         return
     given = [np.asarray(place, dtype=float) for place in cut.points or cut.line if isinstance(place, Sequence)]

@@ -36,6 +36,7 @@ from warpflat.pattern.drafting.fitting import (
     uncrossed,
 )
 from warpflat.pattern.drafting.label import Label
+from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.notches import cut_darts, dart_notches, seam_notches, seam_reports
 from warpflat.pattern.drafting.piece_parts import Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam
@@ -185,12 +186,12 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
     for name, line in fisheyes.items():
         first, second = map(polyline_length, fisheye_legs(line))
         if abs(first - second) > SEAM_TOLERANCE:
-            uneven.append(f"dart {name}: its sides differ by {abs(first - second) * 1000:.1f} mm")
+            uneven.append(f"dart {name}: its sides differ by {length_words(abs(first - second), piece.units)}")
     # What even the widest tolerance leaves wavy.
     wavy = [e.name for e in edges if tolerance is None and e.tolerance > TOLERANCE and is_wavy(e.curve)]
     ragged = [
         f"the border stays ragged at {', '.join(wavy)}: no smooth line of the right length keeps within "
-        f"{TOLERANCES[-1] * 1000:.0f} mm of it; a cut along the rows of the mesh, or a finer mesh, may help"
+        f"{length_words(TOLERANCES[-1], piece.units)} of it; a cut along the rows of the mesh, or a finer mesh, may help"
     ]
     drafted = DraftedPiece(
         piece=piece,
@@ -211,9 +212,9 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         notes=(
             *cut.notes,
             *(ragged if wavy else ()),
-            *(note for dart, both in zip(darts, legs, strict=True) for note in dart_notes(dart, *both)),
+            *(note for dart, both in zip(darts, legs, strict=True) for note in dart_notes(dart, *both, piece.units)),
             *[
-                f"{hole.name} is too small for an allowance of {hole.width * 1000:g} mm: it is cut on its sewing line"
+                f"{hole.name} is too small for an allowance of {length_words(hole.width, piece.units)}: it is cut on its sewing line"
                 for hole in piece.holes
                 if hole.name in cutouts and cutouts[hole.name].width < hole.width
             ],

@@ -12,6 +12,7 @@ from warpflat.flat import are_curved
 from warpflat.pattern.drafting.curves import TOLERANCE, farthest, fit_curve
 from warpflat.pattern.drafting.dart_allowance import WIDEST_DART
 from warpflat.pattern.drafting.drafted import DraftedDart, DraftedEdge, drawn_leg
+from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.piece_parts import DEFAULT_ALLOWANCE, SAME_POINT, Dart
 from warpflat.pattern.drafting.pieces import Piece
 from warpflat.pattern.drafting.seam_difference import SEAM_TOLERANCE
@@ -78,17 +79,17 @@ def draft_dart(
     return DraftedDart(dart=dart, tip=wedge.tip, fold=fold, fold_to=wedge.fold_to, opening=opening)
 
 
-def dart_notes(drafted: DraftedDart, left: DraftedEdge, right: DraftedEdge) -> list[str]:
-    """Return what the cutter should know of a dart whose legs have their allowance."""
-    dart, mouth, notes = drafted.dart, f"{drafted.opening * 1000:.0f} mm", list[str]()
-    bend = f"{max(farthest(leg.line[[0, -1]], leg.line) for leg in (left, right)) * 1000:.0f} mm"
+def dart_notes(drafted: DraftedDart, left: DraftedEdge, right: DraftedEdge, units: str) -> list[str]:
+    """Return what the cutter should know of a dart whose legs have their allowance, with lengths in the units of the pattern."""
+    dart, mouth, notes = drafted.dart, length_words(drafted.opening, units), list[str]()
+    bend = length_words(max(farthest(leg.line[[0, -1]], leg.line) for leg in (left, right)), units)
     if dart.pleat is None and abs(left.length - right.length) > SEAM_TOLERANCE:
-        notes.append(f"dart {dart.name}: its legs differ by {abs(left.length - right.length) * 1000:.1f} mm")
+        notes.append(f"dart {dart.name}: its legs differ by {length_words(abs(left.length - right.length), units)}")
     if drafted.fold is None and left.width > 0:
         why = f"its legs bend by {bend}" if dart.cut else "it opens too wide"
         notes.append(f"dart {dart.name} is cut away, not folded: {why}; sew its legs as a seam")
     if dart.pleat is not None:
-        notes.append(f"pleat {dart.name}: fold {mouth}, sew {dart.pleat * 1000:.0f} mm down from the edge")
+        notes.append(f"pleat {dart.name}: fold {mouth}, sew {length_words(dart.pleat, units)} down from the edge")
     elif drafted.fold is not None and dart.cut:
         notes.append(
             f"dart {dart.name} is folded, not cut away: its mouth of {mouth} has no room for the "

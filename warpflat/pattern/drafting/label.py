@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.util import find_spec
@@ -29,6 +30,7 @@ __all__ = [
     "TITLE",
     "Label",
     "Words",
+    "allowances_of",
     "box_around",
     "cutting_words",
     "embedded_font",
@@ -170,13 +172,8 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
     lines += [
         f"{cutting_words(replace(piece, quantity=count, also={}))} - {cloth}" for cloth, count in piece.also.items()
     ]
-    # The legs of a dart that is cut away are sewn as a seam, and what is turned in has as much.
     allowances = []
-    for kind in ("seam", "hem"):
-        alike = [
-            e for e in piece.edges if e.kind == kind or (kind == "seam" and e.kind in ("dart", "cut") and e.width > 0)
-        ]
-        values = [length_words(width, piece.units) for width in sorted({round(e.width, 4) for e in alike})]
+    for kind, values in allowances_of(((edge.kind, edge.width) for edge in piece.edges), piece.units).items():
         if values:
             # The unit once: "6/10 mm".
             numbers = [value.removesuffix(f" {piece.units}") for value in values]
@@ -188,6 +185,18 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
     if title.upper() != lines[0]:
         lines.append(title)
     return tuple(lines)
+
+
+def allowances_of(edges: Iterable[tuple[str, float]], units: str) -> dict[str, list[str]]:
+    """Return the different allowances of seams and of hems among edges, of which each gives its kind and its width [m], in words.
+
+    The legs of a dart that is cut away are sewn as a seam, and what is turned in has as much.
+    """
+    widths: dict[str, set[float]] = {"seam": set(), "hem": set()}
+    for kind, width in edges:
+        if kind in ("seam", "hem", "dart", "cut") and width > 0:
+            widths["hem" if kind == "hem" else "seam"].add(round(width, 4))
+    return {kind: [length_words(width, units) for width in sorted(row)] for kind, row in widths.items()}
 
 
 def cutting_words(piece: Piece) -> str:

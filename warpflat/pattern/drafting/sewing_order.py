@@ -19,8 +19,8 @@ import numpy as np
 from warpflat.core import other_side, unnumbered, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.measures import length_words
-from warpflat.pattern.drafting.pieces import Seam, SeamOpening, SeamSide
-from warpflat.pattern.drafting.polygons import turn_between
+from warpflat.pattern.drafting.pieces import Piece, Seam, SeamOpening, SeamSide
+from warpflat.pattern.drafting.polygons import signed_area, turn_between
 from warpflat.pattern.drafting.seam_words import joint_words
 from warpflat.pattern.drafting.sewing_tasks import GATHERED, Place, SewingTasks, Task, pieces_of, techniques
 from warpflat.pattern.drafting.words import letters_of, translate, translate_name
@@ -35,6 +35,8 @@ __all__ = [
     "tools",
 ]
 
+# A ring that is cut straight, so many times as long as wide, is stretched by up to this share as it is sewn on.
+_SLENDER, _STRETCHED = 15.0, 0.25
 # Seams are as long as each other up to this difference [mm].
 _ONE_LENGTH = 0.1
 #: A corner of a piece of cloth: its name, whether it is turned over, its copy, and the number of the edge that begins there.
@@ -394,8 +396,9 @@ class _Workshop(SewingTasks):
         held = ""
         if abs(seam.ease) >= 5e-4 and not pleated:
             share = seam.ease if seam.ease > 0 else 1.0 / (1.0 + seam.ease) - 1.0
-            band = pieces[seam.sides[0 if seam.ease > 0 else 1][0].piece].role == "strip"
-            held = "stretch" if band else "gather" if share > GATHERED else "ease in"
+            band = pieces[seam.sides[0 if seam.ease > 0 else 1][0].piece]
+            stretched = band.role == "strip" or (share < _STRETCHED and self._is_ring(band))
+            held = "stretch" if stretched else "gather" if share > GATHERED else "ease in"
         new = letters_of(len(set(self.letters.values())))
         letter = new if task.like is None else self.letters[task.like.seams[0].name]
         self.letters |= {each.name: letter for each in group}
@@ -426,6 +429,12 @@ class _Workshop(SewingTasks):
                 places=tuple(places),
             )
         ]
+
+    def _is_ring(self, piece: Piece) -> bool:
+        """Return whether a piece is a slender strip whose ends are sewn to each other."""
+        lengths = [edge.length for edge in piece.edges]
+        slender = (sum(lengths) / 2.0) ** 2 > _SLENDER * signed_area(piece.outline)
+        return slender and any({side.piece for side in each.stretches} == {piece.name} for each in self.seams)
 
     def _words(self, rows: Iterable[Sequence[SeamSide]]) -> str:
         """Return the pieces of each row once: those in a row are sewn to each other before."""

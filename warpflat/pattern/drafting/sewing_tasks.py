@@ -101,7 +101,9 @@ class SewingTasks:
         self.above = "right" if garment.garment.worn is None else garment.garment.worn.buttonholes
         self.order = {name: [edge.name for edge in piece.edges] for name, piece in self.pieces.items()}
         self.lengths = {report.name: report.length_mm for report in garment.seams if report.size == size}
-        self.tasks = [Task(technique=self._technique(group), seams=group) for group in _mirror_groups(self.seams)]
+        self.tasks = [
+            Task(technique=self._technique(group), seams=group) for group in _mirror_groups(self.seams, self.pieces)
+        ]
         # A zip lies in one of two sides. Of halves on the fold the seam of one side stands for both.
         for task in [task for task in self.tasks if task.seams[0].openings]:
             name = other_side(task.seams[0].name)
@@ -125,7 +127,10 @@ class SewingTasks:
         # Of four bags two are one pocket, and sewn to each other.
         needed = (4 if joined[0].role == "pocket" else 0) if across else 2
         copied = any(side.copy for side in seam.stretches)
-        if not copied and all(piece.quantity == needed and not piece.on_fold for piece in joined):
+        # What is cut twice, such as an armhole's band, is sewn to both sides of what is cut once.
+        twice = [piece.quantity == needed and not piece.on_fold for piece in joined]
+        both = [other_side(s.edge) != s.edge and other_side(s.edge) in self.order[s.piece] for s in seam.stretches]
+        if not copied and any(twice) and all(map(any, zip(twice, both, strict=True))):
             return True
         return other != seam.name and all(piece.on_fold or piece.is_pair for piece in joined)
 
@@ -481,13 +486,15 @@ def is_flounce(piece: Piece) -> bool:
     return "flounce" in re.split("[ _]", piece.name)
 
 
-def _mirror_groups(seams: Sequence[Seam]) -> list[list[Seam]]:
+def _mirror_groups(seams: Sequence[Seam], pieces: Mapping[str, Piece]) -> list[list[Seam]]:
     """Return seams that are each other's mirror images together, which are sewn alike."""
     groups: dict[object, list[Seam]] = {}
     copied = {s.place for seam in seams for s in seam.stretches if s.copy}
     alike: dict[tuple[str, str], object] = {}
+    images: dict[object, object] = {}
     for seam in seams:
         # Edges of equal pieces, of which one is drawn, have the notches of one seam.
+        key: object
         own = [s.place for s in seam.stretches if s.place in copied]
         if own:
             key = next((alike[edge] for edge in own if edge in alike), own[0])
@@ -496,8 +503,23 @@ def _mirror_groups(seams: Sequence[Seam]) -> list[list[Seam]]:
             continue
         sides = sorted(tuple(sorted((without_side(s.piece), line_name(s.edge)) for s in side)) for side in seam.sides)
         # A zip in one side alone makes it another seam than the other side. Parts of an edge are numbered around the piece.
-        groups.setdefault((without_side(seam.name), tuple(sides), seam.openings), []).append(seam)
+        key = without_side(seam.name), tuple(sides), seam.openings
+        if any(pieces[side.piece].is_pair for side in seam.stretches):
+            # Whatever its name, the seam of the copies that are turned over is the mirror image, at the other sides of other pieces.
+            image = [[_mirror_image(side, pieces[side.piece]) for side in row] for row in seam.sides]
+            here, there = (
+                frozenset(frozenset((side.place, side.mirrored) for side in row) for row in rows)
+                for rows in (seam.sides, image)
+            )
+            key = images.setdefault((here, seam.openings), key)
+            images[there, seam.openings] = key
+        groups.setdefault(key, []).append(seam)
     return list(groups.values())
+
+
+def _mirror_image(side: SeamSide, piece: Piece) -> SeamSide:
+    """Return the stretch of the mirrored seam: of a pair the copy that is turned over, else the edge of the other side."""
+    return replace(side, mirrored=not side.mirrored) if piece.is_pair else replace(side, edge=other_side(side.edge))
 
 
 def _buttons_at_one_end(piece: DraftedPiece) -> bool:

@@ -98,7 +98,8 @@ def write_dxf(
                 f"FABRIC: {' / '.join(cloths_of(piece))}",
                 *(
                     "ANNOTATION: " + text.replace("\n", " ")
-                    for text, _ in piece.label.lines[1 + bool(piece.size) :][:1]
+                    # How often it is cut, from each of its cloths.
+                    for text, _ in piece.label.lines[1 + bool(piece.size) :][: len(cloths_of(piece))]
                 ),
             ]
             low, high = piece.label.box.min(axis=0), piece.label.box.max(axis=0)

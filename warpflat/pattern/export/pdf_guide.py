@@ -11,7 +11,7 @@ from warpflat.core import FloatArray, energy_words, without_side
 from warpflat.pattern.drafting.cut_list import cloths_of, cut_list
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.finished import finished_lengths
-from warpflat.pattern.drafting.label import CAPITALS, cutting_words, printed_size, wrap_text
+from warpflat.pattern.drafting.label import CAPITALS, allowances_of, cutting_words, printed_size, wrap_text
 from warpflat.pattern.drafting.marker import WIDTHS, cloth_needed
 from warpflat.pattern.drafting.measures import cloth_words, length_words
 from warpflat.pattern.drafting.piece_parts import FoundSeam
@@ -140,14 +140,11 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     page.paragraph(tools(whole, steps), indent=0.030, lead=translate("Tools"))
     _cloth(page, whole)
     _pieces_to_cut(page, pieces)
-    widths: dict[str, set[float]] = {"seam": set(), "hem": set()}
-    for edge in (edge for piece in pieces for edge in piece.edges if edge.kind in ("seam", "hem", "cut")):
-        if edge.width > 0:
-            widths["hem" if edge.kind == "hem" else "seam"].add(round(edge.width, 4))
+    edges = ((edge.kind, edge.width) for piece in pieces for edge in piece.edges)
     allowances = [
-        translate(f"{kind}s {{width}}", width=listed([page.length(width) for width in sorted(row)]))
-        for kind, row in widths.items()
-        if row
+        translate(f"{kind}s {{width}}", width=listed(widths))
+        for kind, widths in allowances_of(edges, pattern.units).items()
+        if widths
     ]
     told = "Allowances are included: {allowances}." if allowances else "No allowances are included."
     grain = translate("Lay every grain arrow along the selvedge.")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.text import area_words
 from warpflat.flat.surface.connectivity import components, fan_labels, join_labels, part_fans
 from warpflat.flat.surface.half_edges import HalfEdges, border_edges, paired_half_edges
 from warpflat.flat.surface.normals import area_vectors
@@ -138,7 +139,7 @@ class OuterSheet:
         """Return what was taken, as a note."""
         return (
             f"cloth drawn {1e3 * self.thickness:.2g} mm thick: its outer sheet was taken, the inner one and the rim "
-            f"({1e4 * self.left_out:.0f} cm2) left out"
+            f"({area_words(self.left_out)}) left out"
         )
 
 
