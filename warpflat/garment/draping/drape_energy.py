@@ -34,10 +34,10 @@ __all__ = ["DrapeEnergy"]
 # Fictitious mass over the sum of the stiffness around a vertex. A quarter is the limit of stability at small strains;
 # at 1 wrinkled cloth on a bodice keeps chattering, at 2 it comes to rest.
 _MASS_SCALE = 2.0
-# Stiffness of the body's skin and of friction that holds, over the mass: at a vertex of a woven some 15 N/m. The body carries what presses
-# at no depth; these only hold back what changes. A skin that is stiffer across than the cloth ends each step where some vertex comes to
-# lie on it.
-_SKIN, _GRIP = 5e-4, 3e-4
+# Stiffness of the body's skin and of friction that holds, over the mass: at a vertex of a woven some 15 and 40 N/m. The body carries what
+# presses at no depth; these only hold back what changes. A skin that is stiffer across than the cloth ends each step where some vertex
+# comes to lie on it; by softer friction cloth slides farther before it is held.
+_SKIN, _GRIP = 5e-4, 1.2e-3
 # Where the contact leads and the depth does not fall from round to round, the skin becomes so many times as stiff.
 _STIFFER = 4.0
 # A vertex that nothing holds moves by its weight over this stiffness, so that no step of the minimisation is longer [m]
