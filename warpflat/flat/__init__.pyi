@@ -123,6 +123,7 @@ from .surface.cut.dart_legs import pull_back as pull_back
 from .surface.cut.dart_legs import pull_back_eye as pull_back_eye
 from .surface.cut.split_faces import split_faces_along as split_faces_along
 from .surface.falloff import falloff_weights as falloff_weights
+from .surface.grid import grid_quads as grid_quads
 from .surface.half_edges import HalfEdges as HalfEdges
 from .surface.half_edges import border_edges as border_edges
 from .surface.half_edges import half_edges as half_edges
@@ -160,9 +161,11 @@ from .surface.overlap import OVERLAP as OVERLAP
 from .surface.overlap import overlap_width as overlap_width
 from .surface.overlap import overlapping as overlapping
 from .surface.overlap import parted as parted
+from .surface.paths.band import NARROW_BAND as NARROW_BAND
 from .surface.paths.edge_paths import are_joined as are_joined
 from .surface.paths.edge_paths import as_vertex as as_vertex
 from .surface.paths.edge_paths import path_length as path_length
+from .surface.paths.edge_paths import runs_without as runs_without
 from .surface.paths.lines import line_between as line_between
 from .surface.paths.lines import line_from_curve as line_from_curve
 from .surface.paths.lines import line_from_indices as line_from_indices

@@ -94,6 +94,7 @@ from .mannequin.darts import dart_rows as dart_rows
 from .mannequin.darts import place_darts as place_darts
 from .mannequin.darts import usual_darts as usual_darts
 from .mannequin.ease import EASE_PRESETS as EASE_PRESETS
+from .mannequin.ease import EASE_RANGE as EASE_RANGE
 from .mannequin.ease import ease_from as ease_from
 from .mannequin.elbow_darts import ELBOW as ELBOW
 from .mannequin.forms import Form as Form

@@ -9,12 +9,12 @@ from .drafting.fairing import fair_line as fair_line
 from .drafting.fairing import fairest_line as fairest_line
 from .drafting.fitting import drawn_length as drawn_length
 from .drafting.from_mesh import MeshFeatures as MeshFeatures
-from .drafting.from_mesh import inner_stretches as inner_stretches
 from .drafting.from_mesh import line_labels as line_labels
 from .drafting.from_mesh import piece_from_mesh as piece_from_mesh
 from .drafting.marker import Cloth as Cloth
 from .drafting.marker import make_marker as make_marker
 from .drafting.matched_lay import Stripes as Stripes
+from .drafting.notches import even_notches as even_notches
 from .drafting.piece_parts import DEFAULT_ALLOWANCE as DEFAULT_ALLOWANCE
 from .drafting.piece_parts import FOLD_STRAIGHT as FOLD_STRAIGHT
 from .drafting.piece_parts import HEMMED_LEVELS as HEMMED_LEVELS
@@ -98,6 +98,7 @@ from .export.sewn_usd import write_sewn_usd as write_sewn_usd
 from .export.usd import DRAFTED as DRAFTED
 from .export.usd import FrameWriter as FrameWriter
 from .export.usd import film_scale as film_scale
+from .export.usd_prims import FRAME_RATE as FRAME_RATE
 from .export.usd_prims import begin_stage as begin_stage
 from .export.usd_prims import bounding_box as bounding_box
 from .export.usd_prims import define_group as define_group

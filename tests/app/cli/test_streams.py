@@ -13,7 +13,7 @@ import trimesh
 from bodies import mean_person
 
 from warpflat.app.cli.main import cli
-from warpflat.garment.mannequin.body_model import BodyModel, finer_body
+from warpflat.garment.mannequin.body_model import BodyModel
 
 QUICK = "[relax]\nmax_steps = 30\n[output]\nframes = 0\npicture = false\n[pattern]\nformats = ['json']\n"
 CAP = "datum = 'centre'\n[surface]\nshape = 'bodice'\nresolution = 5\n"
@@ -46,8 +46,8 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "cap.obj").write_bytes(CLOTH)
     (folder / "skirt.obj").write_bytes(SKIRT)
     (folder / "square.svg").write_text(SQUARE)
-    model, (finer, triangles) = BodyModel.load(), finer_body()
-    trimesh.Trimesh(finer @ model.vertices(mean_person(model)), triangles, process=False).export(folder / "body.obj")
+    model = BodyModel.load()
+    trimesh.Trimesh(model.vertices(mean_person(model)), model.triangles, process=False).export(folder / "body.obj")
     return folder
 
 

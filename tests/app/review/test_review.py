@@ -112,6 +112,20 @@ def test_console_and_page_count_the_pieces_that_the_pattern_numbers(run: Path, t
     assert any(line.startswith("2 pattern pieces, ") for line in summary_lines(metrics, ["metrics.json"], "out"))
 
 
+@pytest.mark.parametrize(("stretch", "said"), [(0.04, "<b>4 % of 5 %</b>"), (0.13, "<b>13 %</b>")])
+def test_no_cloth_is_allowed_more_than_its_limit(run: Path, tmp_path: Path, stretch: float, said: str) -> None:
+    metrics = json.loads((run / "metrics.json").read_text())
+    metrics["verdict"] = {"fits": True, "by": "strain", "words": "fits by its strain", "findings": []}
+    wear = metrics["pieces"]["trial"]["wear"]
+    metrics["pieces"]["trial"]["wear"] = {
+        **wear,
+        "strain_limit": 0.05,
+        "strain_warp": {**wear["strain_warp"], "p95": stretch},
+    }
+    write_review(tmp_path, metrics, [], name="trial", film=None)
+    assert said in (tmp_path / "review.html").read_text(encoding="utf-8")
+
+
 def test_the_command_writes_the_page_again_and_moving_pictures(
     run: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

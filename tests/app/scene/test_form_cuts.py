@@ -201,7 +201,7 @@ def test_a_dart_turned_into_a_pleat_is_sewn_as_far_as_it_is_drawn(tmp_path: Path
     assert [polyline_length(front.drawn_line(leg)) for leg in legs] == pytest.approx([0.04] * len(legs), abs=1e-6)
     assert sum(notch.seam.startswith("waist dart") for notch in front.notches) == len(legs)
     assert "PLEAT: waist dart left" in (tmp_path / "pleat.dxf").read_text(encoding="utf-8")
-    assert any("pleat waist dart left: fold 40 mm" in note for note in written.notes)
+    assert any("pleat waist dart left: fold 4 cm" in note for note in written.notes)
 
 
 def test_the_command_makes_a_cut_of_a_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]):

@@ -19,7 +19,7 @@ from warpflat.app.scene.outside_pattern import OutsideJob
 from warpflat.garment.construction.as_cut import read_cut_pattern, worn_at
 from warpflat.garment.construction.sewn_panels import read_sewn_panels
 from warpflat.garment.draping.mesh_pieces import mesh_pieces
-from warpflat.garment.mannequin.body_model import BodyModel, finer_body, rotation
+from warpflat.garment.mannequin.body_model import BodyModel, rotation
 from warpflat.pattern.drafting.piece_parts import Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.pattern.export.read_pattern import read_pattern
@@ -125,13 +125,11 @@ def test_a_worn_mesh_is_draped_by_its_pattern_from_where_it_is_worn(command: Com
 
 def test_a_worn_mesh_lies_on_the_scan_that_stands_where_it_does(tmp_path: Path):
     """The scan is in cm, turned, aside and below, its legs apart; a garment beside it starts as on any other body."""
-    body, corners = finer_body()
     model = BodyModel.load()
-    person = mean_person(model)
-    skin = body @ model.vertices(person)
+    skin = model.vertices(mean_person(model))
     turn = rotation(np.array([[0.0, 0.6, 0.0]]))[0]
     aside = np.array([0.4, -1.2, 0.7])
-    trimesh.Trimesh(100.0 * (skin @ turn + aside), corners, process=False).export(tmp_path / "scan.obj")
+    trimesh.Trimesh(100.0 * (skin @ turn + aside), model.triangles, process=False).export(tmp_path / "scan.obj")
     hip = np.array([0.0, skin[:, 1].min() + 0.75, 0.0])
     for beside in (np.zeros(3), np.array([1.0, 0.0, 0.0])):
         file = write_obj(

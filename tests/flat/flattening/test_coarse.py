@@ -95,10 +95,10 @@ def test_a_cut_opens_on_a_mesh_too_large_to_factor(too_large: None):
 
 def test_contact_on_the_coarser_mesh_is_carried_up(monkeypatch: pytest.MonkeyPatch):
     """The strip lies apart in the layout of the coarser mesh, from which contact on its own one starts."""
-    strip = ramp(201, 17)
+    strip = ramp(121, 11)
     fine = flatten(strip, device=DEVICE)
-    monkeypatch.setattr(flatten_piece, "_COARSE", 1_200)
-    carried = flatten(ramp(201, 17), device=DEVICE)
+    monkeypatch.setattr(flatten_piece, "_COARSE", 450)
+    carried = flatten(ramp(121, 11), device=DEVICE)
     for flat in (fine, carried):
         assert flat.stages[-1].name == "contact"
         assert flat.converged

@@ -23,6 +23,7 @@ from warpflat.flat.model.fit import MAPS, assess_pattern
 from warpflat.flat.model.wear import Wear, intended_stretch
 from warpflat.flat.surface.curvature import curvature_tensors
 from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.paths.lines import with_lines
 from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.flat.surface.shapes import make_shape
 from warpflat.pattern.export.figure import Pixels
@@ -389,3 +390,20 @@ def test_a_stretch_beyond_the_limit_is_meant_and_told():
     result = warpflat.flatten(sleeve(), fabric=NET, datum="centre", wear=wear, device=DEVICE)
     assert result.fit.within_limits
     assert any("beyond power-net's limit" in note for note in result.notes)
+
+
+def test_a_place_is_told_alike_on_the_mirror_image():
+    """Whatever corner of its face comes first in the mesh."""
+    bodice = warpflat.make_shape("bodice", resolution=17)
+    swapped = {"left": "right", "right": "left"}
+    image = with_lines(
+        make_surface(bodice.vertices * [-1.0, 1.0, 1.0], bodice.faces[:, ::-1], weld=False),
+        {swapped.get(name, name): line for name, line in bodice.lines.items()},
+    )
+    words = [
+        [misfit.words for misfit in warpflat.flatten(surface, fabric="woven", datum="centre").fit.misfits]
+        for surface in (bodice, image)
+    ]
+    turned = [re.sub("left|right", lambda side: swapped[side[0]], told) for told in words[1]]
+    assert words[0]
+    assert sorted(words[0]) == sorted(turned)

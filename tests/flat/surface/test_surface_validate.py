@@ -512,3 +512,9 @@ def test_components_count_by_area():
     vertices, faces = np.vstack([button, panel]), [*fan, [13, 14, 15, 16]]
     for component, count in (("largest", 1), (0, 1), (1, 12)):
         assert len(make_surface(vertices, faces, component=component).faces) == count
+
+
+def test_a_quad_whose_halves_cancel_is_crossed():
+    # Its diagonals are parallel: it spans no area, though each of its corners does.
+    vertices = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    assert find_crossed_quads(vertices, np.array([[0, 1, 2, 3]], dtype=np.int32)).tolist() == [0]

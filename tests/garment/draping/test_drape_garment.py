@@ -93,7 +93,10 @@ def no_strains(faces: np.ndarray) -> dict[str, np.ndarray]:
 def test_cloth_gapes_at_its_edges_and_stands_off_inside(worn: warpflat.Drape):
     cloth, borders = worn.cloth, np.concatenate(border_loops(worn.cloth.faces))
     away = np.linalg.norm(cloth.designed[:, None] - cloth.designed[borders], axis=2).min(axis=1)
-    for vertex, words in ((int(away.argmax()), "stands off 20.0 mm farther"), (int(borders[0]), "gapes by 20.0 mm")):
+    for vertex, words in (
+        (int(away.argmax()), "stands off 20.0 mm from the designed surface,"),
+        (int(borders[0]), "gapes by 20.0 mm"),
+    ):
         near = np.linalg.norm(cloth.designed - cloth.designed[vertex], axis=1) < 0.05
         lift, none = np.where(near, 0.02, 0.0), np.zeros(len(near))
         (place,) = find_places(
@@ -106,6 +109,7 @@ def test_cloth_gapes_at_its_edges_and_stands_off_inside(worn: warpflat.Drape):
             gap=lift,
             strains=no_strains(cloth.faces),
             gathered=near & False,
+            compared_with="designed surface",
         )
         assert words in place.words
 
@@ -118,7 +122,7 @@ def test_a_place_that_goes_on_into_another_piece_names_both(worn: warpflat.Drape
         lift = np.where(near, 0.02, 0.0)
         (place,) = find_places(
             cloth, worn.areas, misfit=lift, meant_to_touch=near, bridged=0.0 * ones, lift=-lift, gap=0.0 * ones,
-            strains=no_strains(cloth.faces), gathered=ones < 0.0,
+            strains=no_strains(cloth.faces), gathered=ones < 0.0, compared_with="designed surface",
         )  # fmt: skip
         assert place.words.endswith(f"falls in by 20.0 mm over {1e4 * worn.areas[near].sum():,.0f} cm2{said}")
 
@@ -127,7 +131,7 @@ def test_a_place_that_goes_on_into_another_piece_names_both(worn: warpflat.Drape
     ("faces", "words"),
     [
         ([[0, 1, 2], [0, 1, 3]], "gapes"),
-        ([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], "stands off"),
+        ([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], "stands off 20.0 mm from the body,"),
     ],
     ids=["sewn twisted", "closed"],
 )
@@ -142,7 +146,7 @@ def test_cloth_without_loops_around_it_has_places_too(faces: list[list[int]], wo
     )  # fmt: skip
     (place,) = find_places(
         cloth, 0.01 * ones, misfit=0.02 * ones, meant_to_touch=ones > 0.0, bridged=0.0 * ones, lift=0.02 * ones,
-        gap=0.02 * ones, strains=no_strains(faces4), gathered=ones < 0.0,
+        gap=0.02 * ones, strains=no_strains(faces4), gathered=ones < 0.0, compared_with="body",
     )  # fmt: skip
     assert words in place.words
 

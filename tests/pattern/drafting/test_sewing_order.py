@@ -380,6 +380,20 @@ def test_ring_is_sewn_after_the_seams_that_it_crosses():
     assert "crown to side: " not in " ".join(steps)
 
 
+def test_both_side_seams_close_a_skirt_and_both_shoulders_do_not_close_a_top():
+    box = [(0.0, 0.0), (0.5, 0.0), (0.5, 0.6), (0.0, 0.6)]
+    names, kinds = ("hem", "side right", "waist", "side left"), ("hem", "seam", "seam", "seam")
+    pieces = [polygon(name, box, names=names, kinds=kinds) for name in ("front", "back")]
+    seams = [sewn(f"front.side {side}", f"back.side {side}", f"side {side}") for side in ("left", "right")]
+    words = [
+        step.words for step in sewing_steps(draft_garment(Pattern(name="p", pieces={"": pieces}, seams=seams)), "")
+    ]
+    assert words[0].startswith("Close, right sides together, notch to notch: A (side: front to back)")
+    pattern = top()
+    steps = [step.words for step in sewing_steps(draft_garment(pattern), "")]
+    assert any("while it lies flat" in step and "(shoulder: " in step for step in steps)
+
+
 def test_what_is_cut_twice_is_sewn_twice_and_once_where_both_seams_are_named():
     pattern = top()
     front, _, back = pattern.pieces[""]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from warpflat.app.cli.options import DONE, ComputingCommand, tell
+from warpflat.app.cli.options import DONE, ComputingCommand, tell_files
 
 __all__ = ["export"]
 
@@ -88,7 +88,5 @@ def export(
         units=units,
     )
     if not quiet:
-        for note in notes:
-            tell(f"note: {note}")
-        click.echo(f"{files[0].parent}: {', '.join(file.name for file in files)}")
+        tell_files(files, notes)
     return DONE

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from warpflat.app.cli.options import DONE, FAULTY, ComputingCommand, tell
+from warpflat.app.cli.options import DONE, FAULTY, ComputingCommand, tell_files
 
 __all__ = ["marker"]
 
@@ -145,7 +145,5 @@ def marker(
     if as_json:
         click.echo(json.dumps({"schema": 1, "markers": plans}))
     elif not quiet:
-        for note in notes:
-            tell(f"note: {note}")
-        click.echo(f"{files[0].parent}: {', '.join(file.name for file in files)}")
+        tell_files(files, notes)
     return FAULTY if any("not_made" in plan for plan in plans) else DONE

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ __all__ = [
     "scene_option",
     "scene_options",
     "tell",
+    "tell_files",
 ]
 
 
@@ -150,6 +151,13 @@ class Output:
 def tell(line: str) -> None:
     """Print a line about the command on standard error."""
     click.echo(f"warpflat: {line}", err=True)
+
+
+def tell_files(files: Sequence[Path], notes: Iterable[str]) -> None:
+    """Print the names of files that have been written into one folder, and the notes on them."""
+    for note in notes:
+        tell(f"note: {note}")
+    click.echo(f"{files[0].parent}: {', '.join(file.name for file in files)}")
 
 
 def output_options(

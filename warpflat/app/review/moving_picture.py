@@ -13,6 +13,7 @@ from warpflat.app.review.page import read_run
 from warpflat.core import FloatArray, InputError, atomic_path, output_folder, reading, record_file
 from warpflat.pattern import (
     DPI,
+    FRAME_RATE,
     SMALLEST_SCALE,
     DrawnView,
     Facets,
@@ -32,7 +33,6 @@ __all__ = ["write_moving_pictures"]
 
 _LONG_SIDE, _SHEET_SIDE = 680, 340  # of the patterns [pixels]
 _FRAMES, _SHEET = 60, (4, 3)
-_RATE = 24
 _MARGIN, _FOOT, _NARROWEST = 0.08, 0.18, 2.2  # [in]; below a picture there is room for a line of words
 _SIZE = 6.0  # [pt]
 
@@ -54,7 +54,7 @@ def write_moving_pictures(folder: Path, *, film: bool, sheet: bool) -> list[str]
         pieces = open_film(folder / "frames.usdc")
         if film:
             images = _images(pieces, _evenly(pieces[0].times, _FRAMES), _LONG_SIDE)
-            each = round(1000 * len(pieces[0].times) / _RATE / len(images))
+            each = round(1000 * len(pieces[0].times) / FRAME_RATE / len(images))
             write_moving_picture(folder / "film.webp", images, each=each, last=1500)
             written.append("film.webp")
         if sheet:

@@ -161,7 +161,7 @@ def _page(
     shown_film = "" if film is None else _film(film)
     if film is None and "frames.usdc" in files:
         shown_film = "<p>The film is too large for a page, or could not be packed; see frames.usdc.</p>"
-    notes = [(f"{piece}: {note}") for piece, entry in metrics["pieces"].items() for note in entry.get("notes", ())]
+    notes = [f"{piece}: {note}" for piece, entry in metrics["pieces"].items() for note in entry.get("notes", ())]
     shown = {**pack_pictures(folder, [file for file in files if file not in pictures]), **pictures}
     # What pictures show, for who does not see them.
     shows = {
@@ -287,6 +287,9 @@ def _cards(metrics: Mapping[str, Any]) -> str:
         # Cloth that is meant to stretch differs from the body by that, which is no error.
         limit = max(each["strain_limit"] for each in fits)
         differs = [(f"{100 * stretch:.0f} % of {100 * limit:.0f} %", "stretch when worn, of what the cloth allows")]
+        if stretch > limit:
+            # Of a band that is cut to be stretched so far.
+            differs = [(f"{100 * stretch:.0f} %", "largest stretch when worn")]
     else:
         differs = [
             (f"{100 * max(piece['length_error'] for piece in pieces):.2g} %", "largest length error"),

@@ -18,6 +18,7 @@ from warpflat.app.review.faults import is_done
 from warpflat.app.review.figures import count_pieces
 from warpflat.app.scene.load import errors_named, make_scene, scene_fabric
 from warpflat.app.scene.options import COMMAND_LINE, errors_of_options
+from warpflat.app.scene.outside_pattern import BESIDE
 from warpflat.core import (
     FloatArray,
     InputError,
@@ -29,7 +30,8 @@ from warpflat.core import (
     nearest,
     quote_value,
 )
-from warpflat.garment import EASE_LEVELS
+from warpflat.flat import METRES_PER_UNIT
+from warpflat.garment import EASE_LEVELS, EASE_RANGE
 
 if TYPE_CHECKING:
     from warpflat.app.scene.run import SceneResult
@@ -50,19 +52,14 @@ __all__ = [
 
 #: What a study leaves, the table of several bodies last.
 STUDY_FILES = ("fit.json", "fit.csv")
-# A garment lies on its body if half of its cloth is nearer than this [m].
-_BESIDE = 0.2
 # Ease is kept if it is by this [m] what it was, or what was asked.
 _KEPT = 0.01
 # Cloth that lies so deep in the body [m] is within it; more than this share of it is told.
 _WITHIN, _TOLD = 0.002, 0.01
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,2})?"
 _LENGTH = re.compile(rf"\s*(?P<level>[a-z]+)\s*=\s*(?P<value>{_NUMBER})\s*(?P<unit>mm|cm|m|in)\s*", re.ASCII)
-_UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 # A texture that may be a normalised one is a pattern where so much of the worn cloth at most is stretched against it, in nine of ten cells.
 _AS_WORN = 0.1
-# Ease is from and to these [m].
-_RANGE = -0.3, 4.0
 #: Axes of a garment's front, and how it is turned to face +Z.
 _FRONTS = {"+z": (1.0, 0.0), "-z": (-1.0, 0.0), "+x": (0.0, 1.0), "-x": (0.0, -1.0)}
 
@@ -204,7 +201,7 @@ class FitJob:
                 )
         cloth = np.concatenate([vertices for vertices, _ in layers])
         far = np.linalg.norm(worn.skin.closest(cloth)[2] - cloth, axis=1)
-        if np.median(far) > _BESIDE:
+        if np.median(far) > BESIDE:
             raise InputError(
                 f"{path}: half of it lies more than {100 * np.median(far):.0f} cm off {body or 'any body inside it'}; give the body on "
                 "which it was made, in the same axes and place, its unit with --units, or leave --from out"
@@ -376,9 +373,9 @@ def ease_wishes(texts: Sequence[str]) -> dict[str, float]:
             raise InputError(f"--ease {quote_value(text)}: give a level and a length with its unit, as waist=40mm")
         if match["level"] not in EASE_LEVELS:
             raise InputError(f"--ease {quote_value(text)}: level {nearest(match['level'], EASE_LEVELS)}")
-        value = float(match["value"]) * _UNITS[match["unit"]]
-        if not _RANGE[0] <= value <= _RANGE[1]:
-            raise InputError(f"--ease {quote_value(text)}: ease is from -30 to 400 cm")
+        value = float(match["value"]) * METRES_PER_UNIT[match["unit"]]
+        if not EASE_RANGE[0] <= 100.0 * value <= EASE_RANGE[1]:
+            raise InputError(f"--ease {quote_value(text)}: ease is from {EASE_RANGE[0]:g} to {EASE_RANGE[1]:g} cm")
         if match["level"] in found:
             raise InputError(f"--ease: {match['level']} is given twice; give it once")
         found[match["level"]] = value
@@ -423,7 +420,6 @@ def fit_to(
     """
     from warpflat.app.scene.run import files_of_run, run_scene
     from warpflat.core import output_folder, record_file
-    from warpflat.flat import METRES_PER_UNIT
     from warpflat.garment import finer_body, graded_layout, with_cuts
 
     known, raw = job.panels if job.keeps_pattern(tables) else [], job.read.raw

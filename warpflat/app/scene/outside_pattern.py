@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from warpflat.garment import Correction, Lift, Mannequin
     from warpflat.pattern import Pattern, Piece, Seam
 
-__all__ = ["OutsideJob", "SewingTable", "drape_outside", "edge_table", "is_pattern_file"]
+__all__ = ["BESIDE", "OutsideJob", "SewingTable", "drape_outside", "edge_table", "is_pattern_file"]
 
-# A garment lies on a scan if half of its borders are nearer than this to the scan's vertices [m].
-_BESIDE = 0.2
+#: A garment lies on a body if half of its cloth, or of its borders, is nearer to it than this [m].
+BESIDE = 0.2
 
 
 class SewnSeamTable(Table):
@@ -319,7 +319,7 @@ def _worn_scan(
         for edge in piece.edges
     ]
     far = cKDTree(body.scan[0]).query(np.concatenate(borders))[0]
-    return (body, moved) if np.median(far) <= _BESIDE else None
+    return (body, moved) if np.median(far) <= BESIDE else None
 
 
 def _body(

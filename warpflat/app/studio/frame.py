@@ -12,10 +12,10 @@ from warpflat.app.studio.worker import Ticket
 from warpflat.core import FloatArray
 from warpflat.flat import Flattening, Progress, RelaxationStep, Surface, WornStrain, worn_strain
 
-__all__ = ["PieceFrame", "Watch"]
+__all__ = ["BETWEEN", "PieceFrame", "Watch"]
 
-# Seconds between two frames.
-_BETWEEN = 0.1
+#: Seconds between two frames, of the page and of a piece.
+BETWEEN = 0.1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -78,7 +78,7 @@ class Watch:
     def is_time(self, name: str) -> bool:
         """Return whether a piece may be shown again; if so, the next time begins."""
         now = monotonic()
-        if now - self._shown.get(name, -1.0) < _BETWEEN:
+        if now - self._shown.get(name, -1.0) < BETWEEN:
             return False
         self._shown[name] = now
         return True

@@ -17,7 +17,7 @@ import viser
 from warpflat.app.scene.load import Scene
 from warpflat.app.studio.cut_tables import cut_along, cut_between, cuttable_lines
 from warpflat.app.studio.door import Door
-from warpflat.app.studio.frame import PieceFrame
+from warpflat.app.studio.frame import BETWEEN, PieceFrame
 from warpflat.app.studio.handles import Handle, pattern_handles
 from warpflat.app.studio.maps import MapScale, drape_gaps, drape_scale, piece_scale
 from warpflat.app.studio.messages import read_message
@@ -33,9 +33,9 @@ from warpflat.garment import Drape, Mannequin
 
 __all__ = ["Page"]
 
-# Seconds between two pictures: at most ten a second, and the newest wins. Words alone take no picture's turn, so that the first picture
-# of an edit comes as soon as there is one.
-_BETWEEN, _BETWEEN_WORDS = 0.1, 0.02
+# Pictures come `BETWEEN` apart, and the newest wins. Words alone, so many seconds apart, take no picture's turn: the first picture of an
+# edit comes as soon as there is one.
+_BETWEEN_WORDS = 0.02
 # All is shown anew where form or pattern has grown or shrunk by more than this share.
 _REFIT = 0.02
 
@@ -131,9 +131,9 @@ class Page:
                 return
             self._drawing = True
             self._dirty.clear()
-            begun, pause = time.monotonic(), _BETWEEN
+            begun, pause = time.monotonic(), BETWEEN
             try:
-                pause = _BETWEEN if self._draw() else _BETWEEN_WORDS
+                pause = BETWEEN if self._draw() else _BETWEEN_WORDS
             except Exception:
                 # The next picture may be a better one; the fault is told where programs tell them.
                 traceback.print_exc()

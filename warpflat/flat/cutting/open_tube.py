@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
-from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.text import find_unused_name, quote_value
 from warpflat.flat.cutting.cut_plan import CutPlan, line_part, make_cuts
@@ -16,7 +15,7 @@ from warpflat.flat.surface.connectivity import border_loops
 from warpflat.flat.surface.cut.pieces import lines_after_cut
 from warpflat.flat.surface.cut.split_faces import split_faces_along
 from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.paths.edge_paths import EdgeGraph
+from warpflat.flat.surface.paths.edge_paths import EdgeGraph, runs_without
 from warpflat.flat.surface.paths.trace import geodesic_path
 from warpflat.flat.surface.tubes import tube_borders
 
@@ -94,7 +93,7 @@ def open_with_cuts(surface: Surface, plans: Sequence[CutPlan]) -> tuple[Surface,
     edges = {tuple(sorted(edge)) for plan in before for path in plan.paths for edge in pairwise(path.tolist())}
     left = []
     for plan in plans:
-        rest = [run for path in plan.paths for run in _without_edges(path, edges)]
+        rest = [run for path in plan.paths for run in runs_without(path, edges)]
         paths = lines_after_cut({str(number): run for number, run in enumerate(rest)}, drawn.faces, opened.cut)
         if paths:
             left.append(replace(plan, paths=tuple(paths.values())))
@@ -115,21 +114,10 @@ def without_overlaps(plans: Sequence[CutPlan]) -> tuple[list[CutPlan], list[str]
             left.append(plan)
         else:
             shorter.append(plan.name)
-            if paths := [run for path in plan.paths for run in _without_edges(path, taken)]:
+            if paths := [run for path in plan.paths for run in runs_without(path, taken)]:
                 left.append(replace(plan, paths=tuple(paths)))
         taken.update(edges)
     return left, shorter
-
-
-def _without_edges(path: IntArray, edges: Collection[tuple[int, ...]]) -> list[IntArray]:
-    """Return the parts of a path between the edges that it shares with others."""
-    runs: list[list[int]] = [[]]
-    for a, b in pairwise(path.tolist()):
-        if tuple(sorted((a, b))) in edges:
-            runs.append([])
-        else:
-            runs[-1] += [b] if runs[-1] else [a, b]
-    return [np.array(run, dtype=np.int32) for run in runs if run]
 
 
 def _draw_openings(surface: Surface, plans: Sequence[CutPlan]) -> tuple[Surface, list[CutPlan]]:

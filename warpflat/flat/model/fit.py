@@ -62,7 +62,7 @@ class Misfit:
         faces: of the region.
         area: flat [m2].
         worst: what is asked of the cloth at its worst face, and the limit.
-        vertex: a corner of that face.
+        vertex: the corner of that face around which most is asked.
     """
 
     surface: Surface = field(repr=False)
@@ -261,13 +261,18 @@ def assess_fit(network: SpringNetwork, positions: FloatArray) -> WornFit:
         area = np.bincount(part, weight[outside], minlength=count)
         # Of each region the face of which most is asked, and of several the first.
         worst = outside[np.lexsort((-most[outside], part))[begin[:-1]]]
+        # And of that face the corner around which most is asked, which is the same one on both sides of the body.
+        corners, used = surface.faces[worst], surface.faces >= 0
+        at = surface.faces[used]
+        around = np.bincount(at, np.broadcast_to(most[:, None], used.shape)[used]) / np.maximum(np.bincount(at), 1)
+        vertices = corners[np.arange(count), np.where(corners >= 0, around[corners].round(9), -np.inf).argmax(axis=1)]
         return tuple(
             Misfit(
                 surface=surface,
                 faces=members[begin[k] : begin[k + 1]],
                 area=float(area[k]),
                 worst=demand.amount(int(worst[k]), int(way[worst[k]])),
-                vertex=int(surface.faces[worst[k], 0]),
+                vertex=int(vertices[k]),
             )
             for k in np.argsort(-area, kind="stable").tolist()
         )

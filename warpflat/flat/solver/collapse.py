@@ -22,7 +22,7 @@ from warpflat.core.arrays import IntArray
 from warpflat.core.compile import launch_quietly
 from warpflat.core.launch import record
 from warpflat.core.sums import range_offsets
-from warpflat.flat.surface.grid import rows_and_columns
+from warpflat.flat.surface.grid import grid_quads, rows_and_columns
 from warpflat.flat.surface.mesh import Surface, once_per_surface
 from warpflat.flat.surface.triangles import triangulate
 from warpflat.kernels.coarsen import Ring, collapse, compose_rows, locate, order_rings, sort_corners
@@ -101,12 +101,11 @@ def _every_second(surface: Surface, grid: IntArray) -> Coarsening:
         nearest.append(before + (share > 0.5))
     kept = grid[np.ix_(*lines)]
     number = np.arange(kept.size, dtype=np.int32).reshape(kept.shape)
-    faces = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
     row, column = (of[surface.faces].min(axis=1) for of in np.divmod(place, grid.shape[1]))
     face_at = np.empty((grid.shape[0] - 1, grid.shape[1] - 1), dtype=np.int32)
     face_at[row, column] = np.arange(len(surface.faces), dtype=np.int32)
     return Coarsening(
-        surface=Surface(vertices=surface.vertices[kept.ravel()], faces=faces, name=surface.name),
+        surface=Surface(vertices=surface.vertices[kept.ravel()], faces=grid_quads(number), name=surface.name),
         kept=kept.ravel(),
         into=number[np.ix_(*nearest)].ravel()[place],
         prolongation=csr_array(kron(*between, format="csr"))[place],

@@ -11,7 +11,12 @@ from warpflat.flat.surface.half_edges import half_edges_of, opposite_half_edges
 from warpflat.flat.surface.mesh import Surface, once_per_faces
 from warpflat.kernels.grid_lists import number_faces
 
-__all__ = ["rows_and_columns"]
+__all__ = ["grid_quads", "rows_and_columns"]
+
+
+def grid_quads(grid: IntArray) -> IntArray:
+    """Return the quads between the vertices of a grid (#rows by #columns), row by row, each around from its lower left corner."""
+    return np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
 
 
 @once_per_faces

@@ -16,6 +16,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, is_number, nearest
+from warpflat.flat.surface.grid import grid_quads
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.repair.validate import make_surface
 
@@ -271,7 +272,7 @@ def grid_surface(
     """Return the surface of `points` (rows by columns by 3); further lines along `rows`, or through given vertices."""
     height, width = points.shape[:2]
     index = np.arange(height * width, dtype=np.int32).reshape(height, width)
-    quads = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
+    quads = grid_quads(index)
     faces = quads
     if triangles:
         pairs = np.stack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]], axis=1).reshape(-1, 3)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.core import FloatArray, IntArray, arc_lengths, segment_lengths
+from warpflat.core import FloatArray, IntArray, arc_lengths, segment_lengths, unit
 from warpflat.kernels.constraints import LENGTHS, LINEAR, STRAIGHT
 
 __all__ = [
@@ -113,9 +113,9 @@ class Correction:
             sums = equations.group_sums(residuals)[groups]
             response = -_RESPONSE * np.diag(np.bincount(of, equations.share[joint]))
             if respond is not None:
-                unit = np.zeros((len(equations), len(groups)))
-                unit[joint, of] = 1.0
-                response = np.stack([equations.group_sums(change)[groups] for change in respond(unit).T], axis=1)
+                each = np.zeros((len(equations), len(groups)))
+                each[joint, of] = 1.0
+                response = np.stack([equations.group_sums(change)[groups] for change in respond(each).T], axis=1)
             missed = float((np.abs(sums) / equations.sum_tolerance[groups]).max())
             if missed > self._missed:
                 self._fraction *= 0.5
@@ -222,8 +222,7 @@ def girth_equations(
         shares: #E.
         positions: #V by 2, where the directions are taken [m].
     """
-    along = positions[edges[:, 1]] - positions[edges[:, 0]]
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    along = unit(positions[edges[:, 1]] - positions[edges[:, 0]])
     coefficient = np.zeros((len(edges), 4, 2))
     coefficient[:, 0], coefficient[:, 1] = -along, along
     ends, sums = np.column_stack([edges, edges]), _GIRTH_TOLERANCE

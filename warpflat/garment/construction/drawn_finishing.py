@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.core import BoolArray, FloatArray, IntArray, arc_lengths, line_name, other_side, unit
-from warpflat.flat import triangulate, vertex_normals
+from warpflat.flat import grid_quads, triangulate, vertex_normals
 from warpflat.garment.mannequin.slicer import UP
 from warpflat.pattern import ViewedPiece
 
@@ -143,7 +143,9 @@ def _seen(sheet: _Sheet, shown: BoolArray, sign: float, *, lines: bool) -> list[
             continue
         rings = []
         if sheet.outlined:
-            cells = np.stack([part[:-1, :-1], part[:-1, 1:], part[1:, 1:], part[1:, :-1]], axis=2).reshape(-1, 4, 2)
+            cells = part.reshape(-1, 2)[
+                grid_quads(np.arange(part[..., 0].size, dtype=np.int32).reshape(part.shape[:2]))
+            ]
             whole = shapely.union_all(shapely.make_valid(shapely.polygons(cells)), grid_size=1e-5).buffer(1e-4)
             rings = [
                 np.asarray(each.exterior.coords)[:-1]

@@ -102,7 +102,7 @@ def give_fullness(
     outcome = relax_under_equations(state).outcome
     positions = state.positions()
     most = max(edge.factor for edge in edges)
-    note = f"{piece.surface.name} has up to {100 * (most - 1.0):.3g} % more length than the body, to be eased or gathered in"
+    note = f"it has up to {100 * (most - 1.0):.3g} % more length than the body, to be eased or gathered in"
     notes = (*piece.notes, note)
     return replace(
         piece,

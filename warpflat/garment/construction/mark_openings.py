@@ -34,14 +34,14 @@ from warpflat.garment.construction.edges import (
 )
 from warpflat.garment.construction.openings import OpeningPart
 from warpflat.garment.construction.strips import folded_strip
-from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamOpening, SeamSide
+from warpflat.pattern import Edge, Pattern, Piece, Seam, SeamOpening, SeamSide, even_notches
 
 __all__ = ["mark_openings", "with_notches"]
 
 # How far inside the sewing line the line of a zip is drawn [m].
 _INSIDE = 0.004
-# A seam's own notches keep this clear of a zip's end [m], and are this far apart, as in `warpflat.pattern.drafting.notches`.
-_CLEAR, _SPACING = 0.030, 0.200
+# A seam's own notches keep this clear of a zip's end [m].
+_CLEAR = 0.030
 # A slit or vent closer to the whole seam than this [m] leaves nothing to sew.
 _LEAST_SEWN = 0.02
 #: Finished width of the ties of a wrap [m].
@@ -181,8 +181,8 @@ def with_notches(pattern: Pattern, seam: Seam, lengths: Mapping[str, Sequence[fl
     for size, at in lengths.items():
         whole = sum(lengths_of(pattern, row, size))
         shares = np.asarray(at) / whole if down != row[0].reversed else 1.0 - np.asarray(at) / whole
-        count, given = max(1, round(whole / _SPACING)), seam.of_size(size).notches
-        spaced = given if given is not None else [(k + 0.42) / count for k in range(count)]
+        given = seam.of_size(size).notches
+        spaced = given if given is not None else even_notches(whole)
         kept = [each for each in spaced if np.abs(each - shares).min() * whole > _CLEAR]
         by_size[size] = tuple(sorted([*shares.tolist(), *kept]))
     return _with_seam(pattern, replace(seam, notches=by_size[pattern.sample], size_notches=by_size))

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from warpflat.core import BoolArray, InputError, IntArray, arc_lengths, find_unused_name
+from warpflat.core import BoolArray, InputError, IntArray, arc_lengths, find_unused_name, unit
 from warpflat.flat import SAME_PLACE, Flattening, Layer, RelaxOptions, Surface, border_loops, join_labels, lies_within
 from warpflat.garment.construction.border_seams import ONE_CURVE, surface_seams
 from warpflat.garment.construction.closed_cuts import seams_of_cuts
@@ -332,7 +332,7 @@ def unsewn_borders(
     order = np.lexsort((gap, here))
     by_itself = np.array([name in alone for name in edges.names])[free][of]
     # The other border lies to the side of one that runs along it, and ahead of one that ends there.
-    way = edge[of[here]] / np.maximum(length[of[here]], np.finfo(float).tiny)[:, None]
+    way = unit(edge[of[here]])
     beside = np.abs(((to - foot[:, None] * along) * way).sum(axis=1)) < _AHEAD * gap
     nearly = (by_itself[here] | by_itself[there]) & (piece[here] != piece[there]) & beside
     order = order[gap[order] <= np.where(nearly, _NEARLY, ONE_CURVE)[order]]

@@ -13,6 +13,7 @@ import numpy as np
 
 from warpflat.core import IntArray, arc_lengths, polyline_length
 from warpflat.flat import (
+    NARROW_BAND,
     Flattening,
     Relaxation,
     border_loops,
@@ -25,8 +26,6 @@ from warpflat.flat import (
 
 __all__ = ["Band", "cut_straight", "find_band"]
 
-# A strip is a band from so many widths on.
-_NARROW = 6.0
 # Its outline turns by more than this at its four corners [rad], seen over this share of its width on both sides.
 _CORNER, _BESIDE_CORNER = np.radians(40.0), 0.4
 # Its width is the same everywhere within this share, and so are its ends.
@@ -73,7 +72,7 @@ def find_band(piece: Flattening) -> Band | None:
     # Sides of a rectangle with this outline and area.
     inside = half**2 - 4.0 * area
     width = 0.5 * (half - np.sqrt(inside)) if inside > 0.0 else half
-    if half - width < _NARROW * width:
+    if half - width < NARROW_BAND * width:
         return None
     around = np.vstack([piece.positions[loop], piece.positions[loop[:1]]])
     ways = []

@@ -36,6 +36,7 @@ from warpflat.flat import (
     open_length,
     pull_back,
     pull_back_eye,
+    runs_without,
     seam_kind,
     separate,
 )
@@ -71,7 +72,6 @@ from warpflat.pattern import (
     SeamSide,
     curve_through,
     default_grain,
-    inner_stretches,
     joint_words,
     line_labels,
     piece_from_mesh,
@@ -463,7 +463,7 @@ def _inner_lines(lines: Mapping[str, Any], border: Sequence[IntArray], flat: Flo
     edges = {(min(a, b), max(a, b)) for ids in border for a, b in pairwise(np.asarray(ids).tolist())}
     found: dict[str, FloatArray] = {}
     for name, line in lines.items():
-        for stretch in inner_stretches(np.asarray(line), edges):
+        for stretch in runs_without(np.asarray(line), edges):
             found[find_unused_name(name, found)] = flat[stretch]
     return found
 

@@ -24,6 +24,7 @@ from warpflat.garment.draping.openings import Opening
 from warpflat.garment.draping.sew_around import AsRigid
 from warpflat.garment.draping.sewn_cloth import SewnCloth
 from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.garment.mannequin.slicer import UP
 
 __all__ = ["Laid", "lay_around"]
 
@@ -39,7 +40,6 @@ _UNDERARM, _BESIDE_ARMPIT = 1.03, 0.1
 _BELOW = 0.03
 # How the rings hold the cloth, over its own stiffness, and for how many rounds.
 _HOLDS = ((0.05, 30), (0.002, 20))
-_UP = np.array([0.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -271,9 +271,7 @@ def _rings(
         radius = each.length / (2.0 * np.pi)
         value, looks = (aside, left) if aside is not None else (hints[:, 2], ahead)
         if name == "neck":
-            centre, out = (
-                (collar, _UP) if not hooded else (lines["head"][2] - _LOWER * _UP + _BEFORE_FACE * ahead, ahead)
-            )
+            centre, out = (collar, UP) if not hooded else (lines["head"][2] - _LOWER * UP + _BEFORE_FACE * ahead, ahead)
         elif name.endswith("arm"):
             line = np.array([collar, *lines[name][1:]])
             # From the edge of the neck along the shoulder.
@@ -283,11 +281,11 @@ def _rings(
             centre = line[1] + beyond * out
             value, looks = (
                 far[named.index("hem") if "hem" in named else named.index(name.replace("arm", "leg"))] - far[highest],
-                _UP,
+                UP,
             )
         elif name.endswith("leg"):
             line = lines[name][1:]
-            height, out = min(high - reach, line[0, 1] - _BELOW), -_UP
+            height, out = min(high - reach, line[0, 1] - _BELOW), -UP
             centre = np.array([np.interp(-height, -line[:, 1], line[:, c]) for c in range(3)])
             side = 1.0 if name.startswith("left") else -1.0
             # Two wide legs lie beside each other.
@@ -295,11 +293,11 @@ def _rings(
             value, looks = -far[named.index("right leg" if side > 0.0 else "left leg")], -side * left
         elif name:
             # A slit is a part of its hem.
-            reach, out = float(np.median(far[highest][each.vertices])), _UP if name == "waist" else -_UP
-            centre = middle * [1.0, 0.0, 1.0] + (high - (0.0 if name == "waist" else reach)) * _UP
+            reach, out = float(np.median(far[highest][each.vertices])), UP if name == "waist" else -UP
+            centre = middle * [1.0, 0.0, 1.0] + (high - (0.0 if name == "waist" else reach)) * UP
         else:
             continue
-        u = unit(np.cross(out, ahead if abs(out[2]) < 0.9 else _UP))
+        u = unit(np.cross(out, ahead if abs(out[2]) < 0.9 else UP))
         # With the cloth on its left a border runs clockwise about the way out of it.
         axes = radius * np.array([u, -handed * np.cross(out, u)])
         step = np.asarray(graph[each.vertices, np.roll(each.vertices, -1)])

@@ -66,6 +66,7 @@ def find_places(
     gap: FloatArray,
     strains: Mapping[str, FloatArray],
     gathered: BoolArray,
+    compared_with: str,
 ) -> tuple[Place, ...]:
     """Find the connected places of misfit, bridged hollows, and strain and shear beyond the cloth's limits, the largest first.
 
@@ -78,6 +79,7 @@ def find_places(
         gap: #V, the distance from the body [m].
         strains: #F, along "warp" and "weft", and "shear" [degrees].
         gathered: #V, true where an elastic draws the cloth together.
+        compared_with: what the cloth is compared with, the "designed surface" or the "body".
     """
     found = list[Place]()
 
@@ -116,7 +118,7 @@ def find_places(
             elif gapes:
                 words = f"gapes by {1e3 * gap[worst]:.1f} mm"
             elif stands_off:
-                words = f"stands off {1e3 * distance:.1f} mm farther than designed,"
+                words = f"stands off {1e3 * distance:.1f} mm from the {compared_with},"
             elif lift[worst] < -0.5 * distance:
                 words = f"falls in by {1e3 * distance:.1f} mm"
             else:

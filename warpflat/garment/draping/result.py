@@ -175,6 +175,11 @@ class Drape:
         """#V, normal force on the body over area [Pa]."""
         return np.asarray(self.worn.pressing / self.areas)
 
+    @property
+    def compared_with(self) -> str:
+        """What distances are from: the designed surface, or the body, where a pattern of a file was designed on none."""
+        return "body" if self.designed is self.body else "designed surface"
+
     @cached_property
     def places(self) -> tuple[Place, ...]:
         """The worst places, the worst first; a misfit near an advised cut names it."""
@@ -184,6 +189,7 @@ class Drape:
         found = find_places(
             self.cloth, self.areas, misfit=self.misfit, meant_to_touch=self.meant_to_touch, bridged=self.bridged,
             lift=self.gap - self.designed_gap, gap=self.gap, strains=self.strains, gathered=gathered,
+            compared_with=self.compared_with,
         )  # fmt: skip
         places = []
         for place in found:
@@ -225,7 +231,7 @@ class Drape:
             "vertices": len(self.positions),
             "friction": self.options.friction,
             "bending_n_m": fabric.bending,
-            "compared_with": "body" if self.designed is self.body else "designed surface",
+            "compared_with": self.compared_with,
             "distance_m": _spread(self.distance, areas),
             "misfit_m": _spread(self.misfit, areas),
             "bridged_m": _spread(self.bridged, areas),

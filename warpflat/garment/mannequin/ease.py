@@ -8,10 +8,10 @@ from typing import Any
 from warpflat.core import InputError, is_number, nearest, quote_value
 from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS, RING_LEVELS
 
-__all__ = ["EASE_PRESETS", "ease_from"]
+__all__ = ["EASE_PRESETS", "EASE_RANGE", "ease_from"]
 
 #: Least and greatest ease [cm].
-_RANGE = -30.0, 400.0
+EASE_RANGE = -30.0, 400.0
 
 
 def _preset(bust: float, underbust: float, waist: float, hip: float, biceps: float) -> dict[str, float]:
@@ -67,9 +67,9 @@ def ease_from(value: Any, where: str, *, base: Mapping[str, float] | None = None
             raise InputError(
                 f"{where}: ease: level {quote_value(level)} is unknown: {nearest(level, [*known, 'preset'])}"
             )
-        if not is_number(ease) or not _RANGE[0] <= ease <= _RANGE[1]:
+        if not is_number(ease) or not EASE_RANGE[0] <= ease <= EASE_RANGE[1]:
             raise InputError(
-                f"{where}: ease: {level} = {quote_value(ease)}: a number from {_RANGE[0]:g} to {_RANGE[1]:g} cm is needed"
+                f"{where}: ease: {level} = {quote_value(ease)}: a number from {EASE_RANGE[0]:g} to {EASE_RANGE[1]:g} cm is needed"
             )
         found[level] = float(ease)
     return found

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core import InputError, IntArray, short_repr
-from warpflat.flat import half_edges
+from warpflat.flat import grid_quads, half_edges
 
 __all__ = ["ARM_LEVELS", "LEG_LEVELS", "LEG_LINES", "QUARTERS", "RING_LEVELS", "Layout", "joined_runs", "make_layout"]
 
@@ -182,13 +182,12 @@ def make_layout(resolution_mm: float = 10.0) -> Layout:
         raise InputError(f"mannequin resolution {resolution_mm:g} mm: valid range 2 to 40 mm")
     strips = _strips(resolution_mm / 1000.0)
     bricks = _bricks(strips)
-    quads = [np.stack([g[:-1, :-1], g[:-1, 1:], g[1:, 1:], g[1:, :-1]], axis=-1) for g in bricks.values()]
-    faces = np.concatenate([each.reshape(-1, 4) for each in quads])
-    face_brick = np.repeat(np.arange(len(bricks)), [(g.shape[0] - 1) * (g.shape[1] - 1) for g in bricks.values()])
+    quads = [grid_quads(grid) for grid in bricks.values()]
+    face_brick = np.repeat(np.arange(len(bricks)), [len(each) for each in quads])
     tube = set(strips.rings[: strips.level_row["hip"]].ravel().tolist())
     around = [bool(tube & set(grid.ravel().tolist())) for grid in bricks.values()]
     return Layout(
-        **vars(strips), bricks=bricks, lines=_lines(strips), faces=faces.astype(np.int32),
+        **vars(strips), bricks=bricks, lines=_lines(strips), faces=np.concatenate(quads).astype(np.int32),
         face_brick=face_brick.astype(np.int32), on_body=~np.array(around)[face_brick],
     )  # fmt: skip
 

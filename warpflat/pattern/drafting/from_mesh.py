@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence, Set
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpflat.core import FloatArray, InputError, IntArray, nearest, optional_step
-from warpflat.flat import MEET, border_loops, parted
+from warpflat.flat import MEET, border_loops, parted, runs_without
 from warpflat.pattern.drafting.corners import find_corners, find_cracks
 from warpflat.pattern.drafting.piece_parts import LEFT_OUT, SAME_POINT, Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import Piece, check_hole
 from warpflat.pattern.drafting.placement import default_grain
 from warpflat.pattern.drafting.polygons import signed_area, upright
 
-__all__ = ["MeshFeatures", "inner_stretches", "line_labels", "piece_from_mesh"]
+__all__ = ["MeshFeatures", "line_labels", "piece_from_mesh"]
 
 
 #: Places in a border of a dart's left mouth, tip and right mouth, in counter-clockwise order.
@@ -109,7 +109,7 @@ def piece_from_mesh(
     internal = {
         key if index == 0 else f"{key}_{index + 1}": flat[stretch]
         for key, line in lines.items()
-        for index, stretch in enumerate(inner_stretches(line, border))
+        for index, stretch in enumerate(runs_without(line, border))
     }
     holes, left_out = _holes(flat, inner, features.fisheyes, name)
     grain = None
@@ -222,19 +222,3 @@ def line_labels(loop: IntArray, curves: Mapping[str, IntArray]) -> list[str]:
             label.setdefault((min(a, b), max(a, b)), key)
     around = [*loop.tolist(), int(loop[0])]
     return [label.get((min(a, b), max(a, b)), "") for a, b in pairwise(around)]
-
-
-def inner_stretches(line: IntArray, border: Set[tuple[int, int]]) -> list[IntArray]:
-    """Return the stretches of a line, as vertex indices, that do not run along a border.
-
-    Args:
-        line: vertex indices.
-        border: edges of the border, each as (lower, higher) vertex.
-    """
-    runs: list[list[int]] = [[]]
-    for a, b in pairwise(line.tolist()):
-        if (min(a, b), max(a, b)) in border:
-            runs.append([])
-        else:
-            runs[-1] += [b] if runs[-1] else [a, b]
-    return [np.array(run, dtype=np.int64) for run in runs if run]

@@ -23,6 +23,7 @@ __all__ = [
     "copied_together",
     "cut_darts",
     "dart_notches",
+    "even_notches",
     "opposite_length",
     "seam_notches",
     "seam_reports",
@@ -151,13 +152,9 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
         # The fractions of the seam's length at which it is notched.
         if seam.notches is not None:
             fractions = list(seam.notches)
-        elif first.length < SHORTEST:
-            fractions = []
         else:
-            count = max(1, round(first.length / SPACING))
             joints = np.concatenate([first.joints / first.length, second.joints / second.length])
-            evenly = ((np.arange(count) + 0.42) / count).tolist()
-            fractions = [f for f in evenly if np.abs(joints - f).min() * first.length > CLEAR]
+            fractions = [f for f in even_notches(first.length) if np.abs(joints - f).min() * first.length > CLEAR]
         for fraction in fractions:
             for share in SHARES_FROM_START:
                 start = share * fraction * first.length
@@ -174,6 +171,12 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
                 for joint in lines[number][own].joints[1:-1]:
                     place_all(number, other, opposite_length(seam, lines[number], own, float(joint)), False, CLEAR)
     return notches
+
+
+def even_notches(length: float) -> list[float]:
+    """Return the shares of a seam of this length [m] at which it is notched where nobody says."""
+    count = max(1, round(length / SPACING))
+    return [(number + 0.42) / count for number in range(count)] if length >= SHORTEST else []
 
 
 def opposite_length(seam: Seam, lines: Sequence[SeamLine], side: int, length: float) -> float:

@@ -298,13 +298,22 @@ class _Workshop(SewingTasks):
         whole: set[frozenset[Corner]] = set()
         found, ready = list[tuple[str, list[Task]]](), list(sorter.get_ready())
 
+        def joined(seam: Seam) -> frozenset[object]:
+            """Return the pieces of cloth that a seam joins, one where they are sewn together already."""
+            ends = [(row[0].piece, row[0].mirrored, row[0].copy) for row in seam.sides]
+            return frozenset(cloth.get(end, end) for end in ends)
+
         def shape(task: Task) -> tuple[int, bool, bool, bool, bool]:
             """Return the turn of a task; of a seam whether it is eased, closes a ring, joins left and right, and front and back."""
             if task.technique not in ("", "lining_join"):
                 return task.how["turn"], False, False, False, False
             seam = task.seams[0]
             first, second = ((row[0].piece, row[0].mirrored, row[0].copy) for row in seam.sides)
-            closes = cloth.get(first, first) == cloth.get(second, second)
+            here = joined(seam)
+            closes = len(here) == 1
+            if len(task.seams) > 1 and all(joined(image) == here for image in task.seams):
+                # The second of both side seams closes a skirt, where nothing else is left that joins its front and back.
+                closes = closes or not any(joined(s) == here for t in self.tasks if t is not task for s in t.seams)
             centre = first[0] == second[0] or other_side(first[0]) == second[0]
             faces = [
                 {"front", "back"} & set(re.split("[ _]", part[0])) or {self.pieces[part[0]].at}

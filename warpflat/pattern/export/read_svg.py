@@ -22,7 +22,7 @@ from warpflat.pattern.drafting.outline_edges import (
     split_outline,
     with_drawn_allowances,
 )
-from warpflat.pattern.drafting.piece_parts import Hole
+from warpflat.pattern.drafting.piece_parts import SAME_POINT, Hole
 from warpflat.pattern.drafting.pieces import Pattern, Piece
 from warpflat.pattern.drafting.polygons import mapped, signed_area
 from warpflat.pattern.drafting.seam_words import seams_of_words
@@ -54,8 +54,6 @@ _NOT_READ = {
     "cutout": "inner cut",
     "drill": "drill hole",
 }
-# Ends that are closer than this [m] are one.
-_ONE_POINT = 1e-6
 # Groups in each other and elements of a file, and letters of an entity, as drawing programs write for namespaces, at most.
 _DEEPEST, _MOST_ELEMENTS, _LONGEST_ENTITY = 100, 200_000, 100
 # How FreeSewing calls the group of a piece, and the classes of its outlines.
@@ -164,7 +162,7 @@ def _own_piece(
     # The sides of a fish-eye dart, one after the other, meet at both ends.
     eyes = list[Hole]()
     for one, other in pairwise(tuple(parts)):
-        if one[1] == other[1] == "dart" and np.abs(one[2][[0, -1]] - other[2][[0, -1]]).max() < _ONE_POINT:
+        if one[1] == other[1] == "dart" and np.abs(one[2][[0, -1]] - other[2][[0, -1]]).max() < SAME_POINT:
             ring = np.concatenate([one[2][:-1], other[2][:0:-1]])
             ring = ring if signed_area(ring) > 0.0 else ring[::-1]
             eyes.append(Hole(name=one[0].removesuffix(".left"), points=ring, kind="dart"))
@@ -173,7 +171,7 @@ def _own_piece(
     if not parts:
         raise InputError(f"{where}: has no sewing line; a group of a piece has paths with data-edge")
     ends = np.array([line[k] for _, kind, line in parts if kind == "dart" for k in (0, -1)]).reshape(-1, 2)
-    close = cKDTree(ends).query(ends, k=2)[0][:, 1] < _ONE_POINT if len(ends) else []
+    close = cKDTree(ends).query(ends, k=2)[0][:, 1] < SAME_POINT if len(ends) else []
     tips = {f"dart_{n}": end for n, end in enumerate(ends) if close[n]}
     edges, darts = named_outline(parts, tips, legs, cutting, where)
     quantity = read_quantity(group.get("data-quantity", "1"))

@@ -23,6 +23,7 @@ from warpflat.pattern.export.geometry import Polylines
 
 __all__ = [
     "FIRST_FRAME",
+    "FRAME_RATE",
     "MeshSamples",
     "SampledLines",
     "add_cameras",
@@ -47,8 +48,8 @@ __all__ = [
 
 #: Number of a film's first frame.
 FIRST_FRAME = 1
-# Frames of a film in a second.
-_RATE = 24.0
+#: Frames of a film in a second.
+FRAME_RATE = 24.0
 
 
 @contextmanager
@@ -136,8 +137,8 @@ def begin_stage(stage: Any, *, root: str = "/World", kind: str = "assembly", is_
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
     if is_film:
-        stage.SetTimeCodesPerSecond(_RATE)
-        stage.SetFramesPerSecond(_RATE)
+        stage.SetTimeCodesPerSecond(FRAME_RATE)
+        stage.SetFramesPerSecond(FRAME_RATE)
         stage.SetStartTimeCode(FIRST_FRAME)
         stage.SetEndTimeCode(FIRST_FRAME)
     stage.SetDefaultPrim(define_group(stage, root, kind=kind))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from warpflat.core.arrays import IntArray
+from warpflat.core.vectors import unit
 from warpflat.flat.surface.connectivity import border_loops
 from warpflat.flat.surface.half_edges import half_edges_of
 from warpflat.flat.surface.mesh import Surface
@@ -16,13 +17,13 @@ from warpflat.flat.surface.paths.edge_paths import EdgeGraph, path_length
 from warpflat.flat.surface.paths.geodesic import distance_from
 from warpflat.flat.surface.triangles import corner_triangles
 
-__all__ = ["line_along_band"]
+__all__ = ["NARROW_BAND", "line_along_band"]
 
 
 # A line is short against its piece below this share of the way between the places of the border that are furthest apart.
 _SHORT = 0.5
-# That way is at least this many widths long in a band. A front with a deep neckline, whose centre line is as short, is no band.
-_NARROW = 6.0
+#: That way is at least this many widths long in a band. A front with a deep neckline, whose centre line is as short, is no band.
+NARROW_BAND = 6.0
 # And its area is at least this share of that way times its greatest width: a body with two long straps is no band.
 _EVEN = 0.5
 # Where the border turns by more than this, an end of the band has a corner (cosine).
@@ -51,7 +52,7 @@ def line_along_band(surface: Surface, line: IntArray) -> IntArray | None:
     area = float(share @ flat_areas(surface.vertices, triangles))
     around = float(graph.length[on_border].sum())
     # Nor, then, is it many widths long, the area being that way times the mean width.
-    if 4 * length >= around or around**2 < 4 * _NARROW * area:
+    if 4 * length >= around or around**2 < 4 * NARROW_BAND * area:
         return None
     loops = border_loops(surface.faces, surface.vertices)
     one = _furthest(surface, loops[0], int(line[0]))[0]
@@ -61,7 +62,7 @@ def line_along_band(surface: Surface, line: IntArray) -> IntArray | None:
     # Of a strip one face wide, all vertices are on the border.
     width = max(greatest, mean)
     ring = len(loops) > 1 and path_length(surface, [np.append(loops[1], loops[1][0])]) > reach
-    if length >= _SHORT * reach or reach < _NARROW * width or mean < _EVEN * greatest or ring:
+    if length >= _SHORT * reach or reach < NARROW_BAND * width or mean < _EVEN * greatest or ring:
         return None
     weight = graph.length / (room[graph.edges].mean(axis=1) + _ROOM * width)
     # The border vertices of either end: those from its tip to corners at most two widths away.
@@ -71,8 +72,7 @@ def line_along_band(surface: Surface, line: IntArray) -> IntArray | None:
         at = int(np.flatnonzero(loops[0] == tip)[0])
         for loop in (np.roll(loops[0], -at), np.roll(loops[0][::-1], at + 1)):
             step = np.diff(surface.vertices[np.append(loop, loop[0])], axis=0)
-            size = np.linalg.norm(step, axis=1)
-            ahead = step / np.maximum(size, np.finfo(float).tiny)[:, None]
+            size, ahead = np.linalg.norm(step, axis=1), unit(step)
             corner = np.einsum("ij,ij->i", ahead[:-1], ahead[1:]) < _CORNER
             near = np.flatnonzero(corner & (np.cumsum(size)[:-1] <= 2 * width))
             if len(near):

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IndexArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.vectors import unit
 from warpflat.flat.surface.half_edges import HalfEdges
 from warpflat.flat.surface.vectors import cross, dot, points_at
 
@@ -147,7 +148,7 @@ def _triangulated(points: FloatArray, row: int) -> NDArray[np.int64]:
     axis = np.eye(3)[int(np.argmin(np.abs(normal)))]
     first = np.cross(axis, normal)
     second = np.cross(normal, first)
-    flat = centred @ np.array([v / max(float(np.linalg.norm(v)), np.finfo(float).tiny) for v in (first, second)]).T
+    flat = centred @ unit(np.array([first, second])).T
     outline = shapely.Polygon(flat)
     number = {corner: n for n, corner in enumerate(map(tuple, flat.tolist()))}
     if not outline.is_valid or len(number) < len(flat):
@@ -201,9 +202,8 @@ def split_quads(
     side = np.roll(p, -1, axis=1) - p
     # The normal of each corner triangle; corners 1 and 3 are the halves along 0-2.
     normal = np.cross(np.roll(side, 1, axis=1), side)
-    size = np.linalg.norm(normal, axis=2)
-    unit = normal / np.maximum(size, np.finfo(float).tiny)[..., None]
-    bent = np.stack([np.einsum("qi,qi->q", unit[:, k], unit[:, k + 2]) for k in (1, 0)], axis=1)
+    size, facing = np.linalg.norm(normal, axis=2), unit(normal)
+    bent = np.stack([np.einsum("qi,qi->q", facing[:, k], facing[:, k + 2]) for k in (1, 0)], axis=1)
     thin = np.stack([np.minimum(size[:, k], size[:, k + 2]) for k in (1, 0)], axis=1)
     mean = np.linalg.norm(side, axis=2).mean(axis=1, keepdims=True)
     flatness = np.where(thin > tolerance * mean**2, bent.round(6), -2.0)
@@ -251,11 +251,10 @@ def _quad_corners(p: FloatArray, tolerance: float) -> tuple[NDArray[Any], ...]:
         slivers; #Q, true for quads whose sides cross.
     """
     normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
-    unit = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
     before, after = np.roll(p, 1, axis=1), np.roll(p, -1, axis=1)
     chord = np.linalg.norm(after - before, axis=2)
     mean = np.linalg.norm(after - p, axis=2).mean(axis=1)
-    twice = np.einsum("fci,fi->fc", np.cross(p - before, after - p), unit)
+    twice = np.einsum("fci,fi->fc", np.cross(p - before, after - p), unit(normal))
     height = twice / np.maximum(chord, np.finfo(float).tiny)
     inward = height <= tolerance * mean[:, None]
     # Where no corner spans an area there is no inside: that is a sliver, not a matter of convexity.

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.text import area_words
+from warpflat.core.vectors import unit
 from warpflat.flat.surface.connectivity import components, fan_labels, join_labels, part_fans
 from warpflat.flat.surface.half_edges import HalfEdges, border_edges, paired_half_edges
 from warpflat.flat.surface.normals import area_vectors
@@ -52,7 +53,7 @@ def part_sheets(vertices: FloatArray, he: HalfEdges) -> tuple[IntArray, IntArray
     length = np.linalg.norm(along, axis=1)
     into = corner_means(vertices, he.faces[he.face[at]]) - vertices[he.tail[at]]
     into -= along * ((into * along).sum(axis=1) / np.maximum(length**2, np.finfo(float).tiny))[:, None]
-    into /= np.maximum(np.linalg.norm(into, axis=1, keepdims=True), np.finfo(float).tiny)
+    into = unit(into)
     starts = np.flatnonzero(np.append(True, np.diff(he.edge[at]) != 0))
     pairs = [
         (first + i, first + j)
@@ -94,7 +95,7 @@ def _facing(middle: FloatArray, vector: FloatArray, reach: FloatArray) -> tuple[
 
     area = np.linalg.norm(vector, axis=1)
     size = float(np.sqrt(0.5 * area.sum()))
-    normal = vector / np.maximum(area, np.finfo(float).tiny)[:, None]
+    normal = unit(vector)
     tree = cKDTree(np.hstack([middle, _TURN * size * normal]))
 
     def mates(rows: NDArray[np.integer], shift: float) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -159,7 +160,7 @@ def outer_sheet(vertices: FloatArray, he: HalfEdges) -> OuterSheet | None:
     middle = corner_means(vertices, faces)
     if float((vector * (middle - middle.mean(axis=0))).sum()) < 0.0:
         vector = -vector
-    normal = vector / np.maximum(area, np.finfo(float).tiny)[:, None]
+    normal = unit(vector)
     found = _facing(middle, vector, _longest_sides(vertices, faces))
     if found is None:
         return None
