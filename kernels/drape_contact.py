@@ -11,6 +11,9 @@ wp.set_module_options({"enable_backward": False})
 TOUCH = wp.constant(wp.float64(1.0e-6))
 # A depth falls enough from round to round if it falls to this share.
 FALLS = wp.constant(wp.float64(0.25))
+# The skin is never stiffer than this share of a vertex's fictitious mass, some quarter of the cloth in tension: a plane is found anew
+# where the cloth has slid to, a little off the one before, and by a stiffer skin that would be a blow.
+STIFFEST = wp.constant(wp.float64(0.015))
 # The normals of a groove's two sides have a cosine below this one.
 TURNED = wp.constant(wp.float32(0.5))
 # What lies nearer to a ball's middle than this share of its radius pushes it off, in so many turns at most; in a sharper groove its middle
@@ -123,7 +126,8 @@ def carry_contact(motion: Motion, contact: Contact, stiffer: wp.float64, first: 
     This is the update of the augmented Lagrangian: where the body pushed by its depth, it then pushes at no depth. Where tight cloth
     is much stiffer than the skin, that takes many rounds, unless the skin becomes stiffer (Nocedal and Wright 2006, framework 17.4).
 
-    motion: of which position is moved. contact: pressed, rubbed and depth are set, and skin where the depth has not fallen enough.
+    motion: of which position is moved, and mass counts. contact: pressed, rubbed and depth are set, and skin where the depth has not
+    fallen enough.
     stiffer: by how much the skin becomes stiffer there.
     """
     i = natural(wp.tid() + first)
@@ -140,7 +144,8 @@ def carry_contact(motion: Motion, contact: Contact, stiffer: wp.float64, first: 
     if push > zero:
         contact.depth[i] = wp.abs(gap)
         if wp.abs(gap) > wp.max(FALLS * before, TOUCH):
-            contact.skin[i] = contact.skin[i] * stiffer
+            stiff = wp.min(contact.skin[i] * stiffer, STIFFEST * motion.mass[i])
+            contact.skin[i] = wp.max(contact.skin[i], stiff)
     contact.rubbed[i] = friction_force(x, n, contact.anchor[i], contact.grip[i], contact.most[i])
     contact.pressed[i] = push
     if push > zero and motion.fixed[i] == wp.int8(0):

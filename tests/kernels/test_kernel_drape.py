@@ -200,22 +200,28 @@ def test_friction_holds_up_to_its_share_of_what_presses():
 
 
 def test_what_presses_as_deep_as_before_gets_a_stiffer_skin():
-    """Above the plane y = 0: a vertex as deep as before, one at a tenth of it, one that is lifted off, and one without a plane."""
+    """Above the plane y = 0: a vertex as deep as before, one at a tenth of it, one lifted off, one without a plane, two of softer cloth."""
     motion, contact = Motion(), Contact()
-    motion.position = on([[0.0, -1e-3, 0.0], [1.0, -1e-4, 0.0], [2.0, 0.5, 0.0], [3.0, -1.0, 0.0]], wp.vec3d)
-    motion.fixed = on(np.zeros(4), wp.int8)
-    contact.centre, contact.normal = on(np.zeros((4, 3)), wp.vec3d), on([[0.0, 1.0, 0.0]] * 3 + [[0.0] * 3], wp.vec3d)
-    contact.skin, contact.grip = on([100.0] * 4, wp.float64), on([50.0] * 4, wp.float64)
-    contact.ball = on(np.zeros(4), wp.float64)
-    contact.pressed, contact.most = on([2.0] * 4, wp.float64), on(np.zeros(4), wp.float64)
-    contact.anchor, contact.rubbed = on(np.zeros((4, 3)), wp.vec3d), on(np.zeros((4, 3)), wp.vec3d)
-    contact.depth = on([1e-3] * 4, wp.float64)
-    launch_each(carry_contact, 4, [motion, contact, 4.0], [], device=DEVICE)
-    np.testing.assert_allclose(contact.skin.numpy(), [400.0, 100.0, 100.0, 100.0])
-    np.testing.assert_allclose(contact.depth.numpy(), [1e-3, 1e-4, 0.0, 0.0])
+    motion.position = on(
+        [[0.0, -1e-3, 0.0], [1.0, -1e-4, 0.0], [2.0, 0.5, 0.0], [3.0, -1.0, 0.0], *[[4.0, -1e-3, 0.0]] * 2], wp.vec3d
+    )
+    motion.fixed, motion.mass = on(np.zeros(6), wp.int8), on([1e5] * 4 + [2e4, 1e3], wp.float64)
+    contact.centre, contact.normal = (
+        on(np.zeros((6, 3)), wp.vec3d),
+        on(np.outer([1, 1, 1, 0, 1, 1], [0.0, 1.0, 0.0]), wp.vec3d),
+    )
+    contact.skin, contact.grip = on([100.0] * 6, wp.float64), on([50.0] * 6, wp.float64)
+    contact.ball = on(np.zeros(6), wp.float64)
+    contact.pressed, contact.most = on([2.0] * 6, wp.float64), on(np.zeros(6), wp.float64)
+    contact.anchor, contact.rubbed = on(np.zeros((6, 3)), wp.vec3d), on(np.zeros((6, 3)), wp.vec3d)
+    contact.depth = on([1e-3] * 6, wp.float64)
+    launch_each(carry_contact, 6, [motion, contact, 4.0], [], device=DEVICE)
+    # The skin is as stiff as the cloth allows, and never softer than before.
+    np.testing.assert_allclose(contact.skin.numpy(), [400.0, 100.0, 100.0, 100.0, 300.0, 100.0])
+    np.testing.assert_allclose(contact.depth.numpy(), [1e-3, 1e-4, 0.0, 0.0, 1e-3, 1e-3])
     # The force is that of the old skin, and what presses lies on its plane.
-    np.testing.assert_allclose(contact.pressed.numpy(), [2.1, 2.01, 0.0, 0.0])
-    np.testing.assert_allclose(motion.position.numpy()[:, 1], [0.0, 0.0, 0.5, -1.0])
+    np.testing.assert_allclose(contact.pressed.numpy(), [2.1, 2.01, 0.0, 0.0, 2.1, 2.1])
+    np.testing.assert_allclose(motion.position.numpy()[:, 1], [0.0, 0.0, 0.5, -1.0, 0.0, 0.0])
 
 
 def test_forces_of_body_and_friction_are_the_gradient_of_their_energy():

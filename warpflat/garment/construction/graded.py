@@ -42,7 +42,7 @@ def graded_layout(surface: Surface, carried: FloatArray, cut: FloatArray) -> Flo
     one, other = shapes[:, :, 0], shapes[:, :, 1]
     length = np.maximum(np.linalg.norm(one, axis=1), 1e-12)
     along = np.einsum("ca,ca->c", one, other) / length
-    height = np.maximum((one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]) / length, 1e-4 * length)
+    height = (one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]) / length
     grown = replace(surface)
     laid = replace(cells, laid=np.stack([length, along, height], axis=1))
     store_results(grown, {face_creases: face_creases(surface), make_cells: read_only(laid)})

@@ -34,9 +34,6 @@ __all__ = ["DrapedCloth", "relax_drape"]
 # Steps for which the body's planes hold, and after which the forces are looked at.
 _STEPS_PER_PLANE = 10
 _STEPS_PER_CHECK = 100
-# Fictitious mass over the sum of the stiffness around a vertex. A quarter is the limit of stability at small strains;
-# at 1 wrinkled cloth on a bodice keeps chattering, at 2 it comes to rest.
-_MASS_SCALE = 2.0
 # No vertex may have more force left than so many times the mean that is allowed.
 _WORST = 100.0
 # Steps of dynamic relaxation at the start: they bring the cloth out of the body and find what it presses on.
@@ -52,6 +49,8 @@ _MOST_ROUNDS, _STEPS_PER_ROUND = 80, 40
 _MEMORY = 20
 # A round ends when the mean force is at most this share of what is allowed; rest is near at so many times what is allowed.
 _ROUND_ENDS, _NEARLY_AT_REST = 0.4, 20.0
+# Where the cloth has so much less force left than body and planes bring with each round, these are what lasts.
+_CONTACT_LEADS = 0.1
 # The rounds end when, on planes found anew, the mean force is at most so many times what is allowed.
 _SETTLED = 5.0
 # Dynamic relaxation goes on while a hundred steps of it leave less than this share.
@@ -107,7 +106,6 @@ class _DynamicRelaxation:
     def __init__(self, cloth: SewnCloth, energy: DrapeEnergy) -> None:
         self._energy, device, count = energy, energy.device, len(cloth.designed)
         self.pressing, self._power, self._residual = (wp.zeros(count, wp.float64, device) for _ in range(3))
-        energy.motion.mass = wp.array(_MASS_SCALE * _gershgorin_bounds(cloth), dtype=wp.float64, device=device)
         halted, blocks = wp.zeros(1, wp.int32, device), min(_BLOCKS, count)
         begin = wp.array(np.linspace(0, count, blocks + 1), dtype=wp.int32, device=device)
         sums = wp.zeros(blocks, wp.float64, device)
@@ -132,25 +130,6 @@ class _DynamicRelaxation:
         """Return the mean and the largest force that was left before the last step, over the mean weight of a vertex."""
         left, mean = self._residual.numpy(), float(self._energy.weight.mean())
         return float(left.mean()) / mean, float(left.max()) / mean
-
-
-def _gershgorin_bounds(cloth: SewnCloth) -> FloatArray:
-    """Return #V, bounds of the sums of the stiffness around each vertex [N/m], by Gershgorin's discs."""
-    fabric, (corner, _, gradient, area), (laplacian, stiffness) = cloth.fabric, cloth.cells(), cloth.laplacian()
-    size = np.abs(gradient)
-    total = size.sum(axis=1, keepdims=True)
-    steepest = []
-    for direction in ("warp", "weft"):
-        points = np.array([(0.0, 0.0), *getattr(fabric, f"curve_{direction}")])
-        slopes = np.diff(points[:, 1]) / np.diff(points[:, 0])
-        steepest.append(max(getattr(fabric, f"stiffness_{direction}"), *slopes.tolist(), 0.0))
-    share = 1.0 / (1.0 - fabric.poisson_ratio**2 * fabric.stiffness_weft / fabric.stiffness_warp)
-    k = share * (1.0 + fabric.poisson_ratio) * np.array(steepest) + 2.0 * fabric.shear_stiffness
-    per_corner = (size * total) @ k
-    per_corner += fabric.shear_stiffness * (size * total[:, :, ::-1]).sum(axis=2)
-    sums = np.bincount(corner.ravel(), (per_corner * area[:, None]).ravel(), minlength=len(cloth.designed))
-    entries = abs(laplacian)
-    return np.asarray(sums + entries @ (stiffness * entries.sum(axis=1)))
 
 
 def relax_drape(
@@ -204,12 +183,13 @@ def relax_drape(
         if residual < _EASES * before:
             before = residual
             continue
-        before = np.inf
+        before, carried = np.inf, np.inf
         while steps >= _FIRST_STEPS and rounds < min(_MOST_ROUNDS, gained_round + _ROUNDS_IN_VAIN) and not fell_off:
             if rounds == 0:
                 energy.load_contact()
             rounds += 1
-            left = _minimise(energy, options.tolerance, near=left <= _NEARLY_AT_REST * options.tolerance)
+            near = left <= _NEARLY_AT_REST * options.tolerance
+            left = _minimise(energy, options.tolerance, near=near, carried=carried)
             places = energy.motion.position.numpy().copy()
             carried = energy.mean_force(energy.at(places))
             observe(places)
@@ -226,13 +206,14 @@ def relax_drape(
     )  # fmt: skip
 
 
-def _minimise(energy: DrapeEnergy, tolerance: float, *, near: bool) -> float:
+def _minimise(energy: DrapeEnergy, tolerance: float, *, near: bool, carried: float) -> float:
     """Take a round of the augmented Lagrangian: some steps, then body and friction take over the forces that they had.
 
     Args:
         energy: of the cloth, which is moved.
         tolerance: as of the options.
         near: whether rest is near: the metric is softer there.
+        carried: the mean force on the planes that the round before found anew, over the mean weight of a vertex.
 
     Returns:
         the mean force that was left, over the mean weight of a vertex.
@@ -245,7 +226,8 @@ def _minimise(energy: DrapeEnergy, tolerance: float, *, near: bool) -> float:
     while descent.iterations < _STEPS_PER_ROUND and left > _ROUND_ENDS * tolerance and descent.step():
         left = energy.mean_force(descent.point)
     left = energy.mean_force(descent.point)
-    energy.carry_contact(descent.point.positions, near=left <= _NEARLY_AT_REST * tolerance)
+    stiffer = left <= _NEARLY_AT_REST * tolerance or left <= _CONTACT_LEADS * carried
+    energy.carry_contact(descent.point.positions, stiffer=stiffer)
     energy.renew_layers()
     energy.motion.velocity.zero_()
     return left
