@@ -19,7 +19,7 @@ __all__ = ["AsRigid", "sew_around", "stretches"]
 
 # Rounds around the thin body, while it grows, and around the whole one. The factor is renewed after so many, or where contact comes to
 # more than this share of the vertices.
-_GATHER, _GROW, _SETTLE, _RENEWED, _NEW_CONTACT = 60, 60, 30, 5, 0.02
+_GATHER, _GROW, _SETTLE, _RENEWED, _NEW_CONTACT = 60, 60, 30, 2, 0.02
 # The cloth is kept so far off the body [m]; planes farther than this do not count.
 _OFF, _REACH = 0.002, 0.12
 # Stiffness over the cloth's: of inertia, of contact, of what stays, and of bending.
