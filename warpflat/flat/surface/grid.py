@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import warp as wp
 
 from warpflat.core.arrays import IntArray
-from warpflat.core.compile import launch_quietly
 from warpflat.flat.surface.half_edges import half_edges_of, opposite_half_edges
 from warpflat.flat.surface.mesh import Surface, once_per_faces
-from warpflat.kernels.grid_lists import number_faces
 
 __all__ = ["grid_quads", "rows_and_columns"]
 
@@ -25,6 +22,12 @@ def rows_and_columns(surface: Surface) -> IntArray | None:
 
     It is computed once per array of faces. Columns count up along the first side of the first face, rows along its second side.
     """
+    # A form is built of quads while a process beside it loads Warp.
+    import warp as wp
+
+    from warpflat.core.compile import launch_quietly
+    from warpflat.kernels.grid_lists import number_faces
+
     faces = surface.faces
     if not surface.is_quad.all():
         return None
