@@ -135,7 +135,7 @@ def test_10_what_is_no_json_says_so_and_where(row: Path, command: Command) -> No
 def test_11_pieces_belong_to_sizes(row: Path, command: Command) -> None:
     ended = command("drape", "some.dxf", "--edges")
     assert set(edges(ended)) == {"FRONT", "YOKE"}
-    assert ended.err == "warpflat: piece 'YOKE' is in size 42 only\n"
+    assert ended.err == "warpflat: note: piece 'YOKE' is in size 42 only\n"
 
 
 def test_13_slits_in_line_are_one_seam(row: Path, command: Command) -> None:

@@ -234,7 +234,7 @@ def test_gathers_widen_the_skirt_and_leave_the_bodice(mannequin: Mannequin):
     ]
     assert hem[1] / hem[0] == pytest.approx(1.5, abs=0.03)
     assert full.sewn.energy_after < 2.0 * plain.sewn.energy_after  # type: ignore[union-attr]
-    assert any("front_skirt has up to 50 % more length" in note for note in full.notes)
+    assert any("front_skirt: it has up to 50 % more length" in note for note in full.notes)
 
 
 @pytest.mark.parametrize("fabric", ["interlock", "isotropic"])
