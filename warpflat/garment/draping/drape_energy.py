@@ -170,7 +170,7 @@ class DrapeEnergy:
     def carry_contact(self, positions: FloatArray, *, stiffer: bool) -> None:
         """Take over the forces of body and friction at #V by 3 places [m], lay the cloth on its planes, and find the planes anew.
 
-        If it is to become stiffer, the skin does so where cloth still presses as deep into it.
+        With `stiffer` the skin becomes stiffer where cloth still presses as deep into it.
         """
         self.motion.position.assign(positions)
         self._each(carry_contact, [self.motion, self.contact, _STIFFER if stiffer else 1.0])

@@ -18,7 +18,7 @@ from warpflat.garment.draping.thin_body import ThinBody
 __all__ = ["AsRigid", "sew_around", "stretches"]
 
 # Rounds around the thin body, while it grows, and around the whole one. The factor is renewed after so many, or where contact comes to
-# more than this share of the vertices.
+# more than this share of the vertices: before free cloth has fallen through a wrist, which the thin body has 9 mm in radius.
 _GATHER, _GROW, _SETTLE, _RENEWED, _NEW_CONTACT = 60, 60, 30, 2, 0.02
 # The cloth is kept so far off the body [m]; planes farther than this do not count.
 _OFF, _REACH = 0.002, 0.12
