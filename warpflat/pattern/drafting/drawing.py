@@ -70,6 +70,11 @@ class Stroke:
     curve: Curve | None = None
     hidden: bool = False
 
+    @property
+    def path(self) -> FloatArray:
+        """Points (#P by 2 [m]) from its first to its last; the first of a closed line is both."""
+        return np.concatenate([self.points, self.points[:1]]) if self.closed else self.points
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OnPaper:
@@ -251,10 +256,9 @@ def _detail_strokes(piece: DraftedPiece) -> list[Stroke]:
         if dart.fold is not None
     ]
     for index, notch in enumerate(piece.notches):
-        for slit, base in enumerate(notch.base):
-            name = f"notch{index}.{notch.seam}" + (f".{slit}" if notch.double else "")
-            line = np.stack([base, base + notch.depth * notch.direction])
-            strokes.append(Stroke(role="notch", name=name, points=line))
+        for number, slit in enumerate(notch.slits):
+            name = f"notch{index}.{notch.seam}" + (f".{number}" if notch.double else "")
+            strokes.append(Stroke(role="notch", name=name, points=slit))
     for hole in piece.drill_holes:
         turn = np.linspace(0, 2 * np.pi, 17)[:-1]
         ring = hole.at + DRILL * np.column_stack([np.cos(turn), np.sin(turn)])

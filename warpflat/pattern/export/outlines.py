@@ -174,7 +174,7 @@ def simple_ring(points: FloatArray, where: str) -> FloatArray:
 
 
 def read_grain(line: DrawnLine) -> FloatArray:
-    """Return the ends of a grain line, 2 by 2 [m], the lower one first: a file draws its pieces as they are worn, whichever way the line runs."""
+    """Return the ends of a grain line, 2 by 2 [m], the lower one first: pieces are drawn as they are worn, whichever way it runs."""
     ends = line.points[[0, -1]]
     return ends[::-1] if ends[1, 1] < ends[0, 1] else ends
 

@@ -329,13 +329,7 @@ def sheet_names(tiling: Tiling, drawings: Sequence[tuple[Drawing, ...]]) -> dict
     lines, words = [], []
     for placed, sizes in zip(tiling.sheet.placed, drawings, strict=True):
         for drawing in sizes:
-            lines += [
-                shapely.LineString(
-                    placed.on_sheet(np.vstack([each.points, each.points[:1]] if each.closed else [each.points]))
-                )
-                for each in drawing.strokes
-                if not each.hidden
-            ]
+            lines += [shapely.LineString(placed.on_sheet(each.path)) for each in drawing.strokes if not each.hidden]
             words += [shapely.Polygon(placed.on_sheet(each.box())) for each in drawing.words]
     taken = shapely.STRtree([*lines, *words])
     height, found = SHEET_NAME * CAPITALS / POINT, {}
