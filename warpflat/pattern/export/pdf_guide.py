@@ -162,7 +162,9 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     if steps:
         page.heading(translate("Sewing order"), 3 * LINE + STEP_HEIGHT)
         page.paragraph(
-            translate("Right sides together. Letters stand beside the notches; notches with the same letter meet.")
+            translate(
+                "Right sides together. Letters stand beside the notches, and on edges without any; notches with the same letter meet."
+            )
             + " "
             + translate("Press each seam when it is sewn, and neaten edges that stay open inside.")
         )
