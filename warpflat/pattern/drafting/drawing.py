@@ -81,6 +81,11 @@ class Stroke:
     curve: Curve | None = None
     hidden: bool = False
 
+    @property
+    def path(self) -> FloatArray:
+        """Points (#P by 2 [m]) from its first to its last; the first of a closed line is both."""
+        return np.concatenate([self.points, self.points[:1]]) if self.closed else self.points
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OnPaper:
@@ -264,10 +269,9 @@ def _detail_strokes(piece: DraftedPiece) -> list[Stroke]:
         if dart.fold is not None
     ]
     for index, notch in enumerate(piece.notches):
-        for slit, base in enumerate(notch.base):
-            name = f"notch{index}.{notch.seam}" + (f".{slit}" if notch.double else "")
-            line = np.stack([base, base + notch.depth * notch.direction])
-            strokes.append(Stroke(role="notch", name=name, points=line))
+        for number, slit in enumerate(notch.slits):
+            name = f"notch{index}.{notch.seam}" + (f".{number}" if notch.double else "")
+            strokes.append(Stroke(role="notch", name=name, points=slit))
     for hole in piece.drill_holes:
         turn = np.linspace(0, 2 * np.pi, 17)[:-1]
         ring = hole.at + DRILL * np.column_stack([np.cos(turn), np.sin(turn)])
@@ -373,9 +377,7 @@ class _Annotations:
         line = Stroke(role="grain", name="", points=np.stack([a, a + depth * inwards, b + depth * inwards, b]))
         bracket = [line, _arrow(a, -inwards), _arrow(b, -inwards)]
         self.strokes += bracket
-        angle = float(np.arctan2(span[1], span[0]))
-        if angle > np.pi / 2 + 1e-6 or angle <= -np.pi / 2 + 1e-6:
-            angle += np.pi
+        angle = float(np.arctan2(*as_read(span / length)[::-1]))
         places = [a + share * (b - a) + (depth / 2) * inwards for share in (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8)]
         inside = [Spot(x=float(x), y=float(y), angle=angle) for x, y in places]
         self._write(translate("PLACE ON FOLD"), min(0.0035, length / 20), inside, enough=CLEAR)
