@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,11 +14,13 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.garment.construction.details import FinishingTable, OpeningTable
 from warpflat.garment.construction.garment import Garment
+from warpflat.garment.construction.garment_files import garment_files
 from warpflat.garment.construction.strips import Strip, swept
 from warpflat.pattern.drafting.fitting import drawn_length
 from warpflat.pattern.drafting.half_pieces import halved
 from warpflat.pattern.drafting.pieces import Pattern
 from warpflat.pattern.drafting.sewing_order import notions, sewing_steps
+from warpflat.pattern.export.pattern_files import PatternOptions
 
 ZIP = OpeningTable(kind="zip", seam="centre back", length_mm=300)
 
@@ -59,6 +63,25 @@ def test_rib_takes_the_place_of_a_strip_along_the_hem(shirt: Garment):
     assert "hip band ends" in found
     assert pattern.piece("front", "").edge("hip").kind == "seam"
     assert plain.piece("front", "").edge("hip").kind == "hem"
+
+
+def test_a_rib_is_in_girths_rings_and_seams(shirt: Garment, tmp_path: Path):
+    """As on paper: without it the hip and the way through it were those of the cloth, and the side ran to its lower edge."""
+    rib = FinishingTable(kind="band", edge="hip", width_mm=60, share=0.85, shorten_mm=60)
+    garment, options = replace(shirt, finishing=(rib,)), PatternOptions(formats=("json",))
+    plain, drawn = (garment_files({"": each}, tmp_path, name="s", options=options).metrics for each in (shirt, garment))
+    band = 1e-3 * lengths(pattern_of(shirt, rib))["hip band"][0]
+    assert drawn["girths"]["hip"]["pattern_m"] == pytest.approx(band, abs=1e-4)
+    assert "ease_wanted_m" not in drawn["girths"]["hip"]
+    assert drawn["girths"]["bust"] == plain["girths"]["bust"]
+    before, after = ({ring["name"]: ring for ring in each["rings"]} for each in (plain, drawn))
+    assert after["hip"]["length_mm"] == pytest.approx(1e3 * band, abs=0.1)
+    share = after["hip"]["length_mm"] / before["hip"]["length_mm"]
+    assert after["hip"]["stretched_mm"] == pytest.approx(share * before["hip"]["stretched_mm"])
+    assert after["neck"] == before["neck"]
+    for name, cut in (("side left", 60.0), ("shoulder left", 0.0)):
+        was, now = (next(seam for seam in each["seams"] if seam["name"] == name) for each in (plain, drawn))
+        assert np.subtract(was["length_mm"], now["length_mm"]) == pytest.approx([cut, cut], abs=0.5)
 
 
 def test_cuff_is_buttoned_behind_where_the_sleeve_is_slit(shirt: Garment):

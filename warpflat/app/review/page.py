@@ -356,7 +356,7 @@ def ease_table(metrics: Mapping[str, Any]) -> str:
         )
         for level, girth in (metrics.get("girths") or {}).items()
     ]
-    told = "<p>The pieces that were flattened, with darts and seams closed; cuffs and bands are not in it.</p>"
+    told = "<p>With darts and seams closed; at a cuff or a band that draws the garment in, around that.</p>"
     return _table(("level", "body", "pattern", "ease", "asked for"), rows) + (told if rows else "")
 
 
@@ -411,7 +411,8 @@ def ledger_table(metrics: Metrics) -> str:
 def seam_table(metrics: Metrics) -> str:
     """Return every seam with its two lengths; empty if there is none."""
     rows = [(seam["name"], " = ".join(seam["sides"]), *seam_figures(seam)) for seam in metrics.get("seams") or ()]
-    return _table(("seam", "sides", "first", "second", "ease", "difference"), rows, text=2)
+    told = "<p>As they are cut: a seam that ends at a cuff or a band is without it.</p>"
+    return _table(("seam", "sides", "first", "second", "ease", "difference"), rows, text=2) + (told if rows else "")
 
 
 def size_table(metrics: Metrics) -> str:

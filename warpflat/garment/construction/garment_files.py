@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 from warpflat.core import optional_step
 from warpflat.garment.construction.form_garment import FormGarment
+from warpflat.garment.construction.girths import drawn_in
+from warpflat.garment.construction.line_drawing import bands_of
 from warpflat.garment.construction.linings import add_interfacing, add_lining, add_pocketing
 from warpflat.pattern import PatternOptions, WrittenPattern, check_names, write_pattern
 
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
     from warpflat.pattern import FoundSeam, Pattern
 
 __all__ = ["garment_files", "surface_files"]
+
+# A seam that is shorter in the pattern than as it was flattened by more than this [mm] ends at a cuff, a band or an opening.
+_SHORTER = 1.0
 
 
 def garment_files(
@@ -49,6 +54,7 @@ def garment_files(
     from warpflat.garment.construction.to_pattern import pattern_of_garment
 
     options, first = options or PatternOptions(), next(iter(garments.values()))
+    made: list[Pattern] = []
     if isinstance(first, FormGarment):
         check_names(options.names, first.parts)
 
@@ -56,9 +62,30 @@ def garment_files(
         pattern, notes = pattern_of_garment(
             garments, name=name, rules=options.rules, sample_size=sample_size, cloth_width=options.cloth_width
         )
-        return _with_linings(replace(pattern, found_seams=tuple(found_seams)), options, Path(folder)), notes
+        made.append(_with_linings(replace(pattern, found_seams=tuple(found_seams)), options, Path(folder)))
+        return made[0], notes
 
-    return write_pattern(make, folder, name=name, options=options)
+    written = write_pattern(make, folder, name=name, options=options)
+    sample = garments.get(made[0].sample) if made else None
+    if not isinstance(sample, FormGarment):
+        return written
+    # What the pattern changes: cuffs and bands draw the garment in, and seams end where they begin.
+    seams, (pattern,) = [seam.as_dict() for seam in sample.seams], made
+    cut = {seam.name: seam for seam in pattern.seams}
+    for seam in (each for each in seams if each["name"] in cut):
+        lengths = [
+            sum(1e3 * pattern.piece(side.piece, pattern.sample).edge(side.edge).length for side in row)
+            for row in cut[seam["name"]].of_size(pattern.sample).sides
+        ]
+        if all(length < flat - _SHORTER for length, flat in zip(lengths, seam["length_mm"], strict=True)):
+            seam["length_mm"] = lengths
+    bands = bands_of(pattern, pattern.sample)
+    further = {
+        "seams": seams,
+        "girths": drawn_in(sample.girths, bands),
+        "rings": [ring.drawn_in(bands).as_dict() for ring in sample.rings],
+    }
+    return replace(written, metrics={**written.metrics, **further})
 
 
 def surface_files(

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from warpflat.garment.mannequin.layout import Layout
     from warpflat.garment.mannequin.mannequin import Mannequin
 
-__all__ = ["girth_constraints", "loose_armholes", "pattern_girths"]
+__all__ = ["drawn_in", "girth_constraints", "loose_armholes", "pattern_girths"]
 
 
 def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]) -> list[KeptGirth]:
@@ -132,6 +132,19 @@ def pattern_girths(
         level = limb if limb in ARM_LEVELS else f"leg_{limb}"
         if level in asked and not any(low < limbs.index(level) < high for low, high in spans):
             found[name]["ease_wanted_m"] = 0.01 * asked[level]
+    return found
+
+
+def drawn_in(girths: Mapping[str, Mapping[str, float]], bands: Mapping[str, float]) -> dict[str, Mapping[str, float]]:
+    """Return girths of a garment that cuffs and bands draw in, by line how long these are [m].
+
+    The ease that was asked for is that of the cloth, not of a band.
+    """
+    found = dict(girths)
+    for level, girth in girths.items():
+        if (band := bands.get(without_side(level))) is not None:
+            body, form = girth["body_m"], girth["form_m"]
+            found[level] = {"body_m": body, "form_m": form, "pattern_m": band, "ease_m": band - body}
     return found
 
 

@@ -25,6 +25,7 @@ from warpflat.flat import area_vectors, border_loops, judge, triangulate, vertex
 from warpflat.garment.construction.button_stand import button_depths
 from warpflat.garment.construction.drawn_finishing import Rises, finishing_views, lost_along
 from warpflat.garment.construction.form_garment import FormGarment
+from warpflat.garment.construction.girths import drawn_in
 from warpflat.garment.construction.mark_openings import TIE_WIDTH
 from warpflat.garment.construction.openings import place_opening
 from warpflat.pattern import ClothKind, Measure, NeededOpening, Pattern, Piece, ViewedPiece, Worn
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from warpflat.flat import Flattening
     from warpflat.garment.construction.garment import Garment
 
-__all__ = ["describe_worn"]
+__all__ = ["bands_of", "describe_worn"]
 
 # Lines are drawn to within this [m]; what covers less [m2] is a sliver of the projection.
 _WITHIN, _LEAST_AREA = 0.001, 1e-5
@@ -84,24 +85,20 @@ def describe_worn(
         views[name] = tuple(piece for piece in seen if piece.outlines or piece.lines)
     measures = {}
     for size, each in garments.items():
-        found, bands = list[Measure](), {} if pattern is None else _bands(pattern, size)
-        for level, girth in (each.girths or {}).items():
+        found = list[Measure]()
+        for level, girth in drawn_in(each.girths, {} if pattern is None else bands_of(pattern, size)).items():
             # Arms and legs are told once.
             if level.endswith(" right") and other_side(level) in each.girths:
                 continue
             name, asked = without_side(level), girth.get("ease_wanted_m")
-            finished = bands.get(name, girth["pattern_m"])
-            # The ease that was asked for is that of the cloth, not of the band that draws it in.
-            found.append(
-                Measure(name=name, body=girth["body_m"], finished=finished, asked=None if name in bands else asked)
-            )
+            found.append(Measure(name=name, body=girth["body_m"], finished=girth["pattern_m"], asked=asked))
         if found:
             measures[size] = tuple(found)
     needed = tuple(
         NeededOpening(
             ring=ring.name, length=ring.length, over=ring.over, girth=ring.girth, depth=ring.opening_needed_mm / 1000
         )
-        for ring in garment.rings
+        for ring in (ring.drawn_in({} if pattern is None else bands_of(pattern, sample)) for ring in garment.rings)
         if ring.passes is False and ring.girth is not None
     )  # fmt: skip
     knits = dict.fromkeys(flat.fabric.name for flat in cloth if flat.fabric.is_knit)
@@ -235,7 +232,7 @@ def _openings(garment: FormGarment, sign: float) -> Iterator[ViewedPiece]:
             yield ViewedPiece(outlines=(), lines=tuple(lines))
 
 
-def _bands(pattern: Pattern, size: str) -> dict[str, float]:
+def bands_of(pattern: Pattern, size: str) -> dict[str, float]:
     """Return by line of the body the length [m] of the cuff or band that a garment ends in there, and that draws it in."""
     found = dict[str, float]()
     for seam in pattern.seams:

@@ -12,12 +12,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core import FloatArray, IntArray, find_unused_name
+from warpflat.core import FloatArray, IntArray, find_unused_name, line_name
 from warpflat.flat import chain_lines
 from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LINES, RING_LEVELS
 
@@ -69,6 +69,11 @@ class GarmentRing:
         if self.girth is None or self.stretched >= self.girth:
             return 0.0
         return _ROUNDED_MM * math.ceil(500.0 * (self.girth - self.length) / _ROUNDED_MM)
+
+    def drawn_in(self, bands: Mapping[str, float]) -> GarmentRing:
+        """Return the ring as the cuff or band is that it ends in, by line how long these are [m]."""
+        band = bands.get(line_name(self.name)) if self.edge else None
+        return self if band is None else replace(self, length=band, stretched=band * self.stretched / self.length)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of `metrics.json`."""
