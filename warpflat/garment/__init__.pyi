@@ -18,7 +18,6 @@ from .construction.details import OpeningTable as OpeningTable
 from .construction.details import PocketTable as PocketTable
 from .construction.details import SeamTable as SeamTable
 from .construction.drawn_curves import CURVES_MM as CURVES_MM
-from .construction.ease import SeamWish as SeamWish
 from .construction.ease import cap_wishes as cap_wishes
 from .construction.ease import seam_ratios as seam_ratios
 from .construction.file_seams import FILE_SEAMS as FILE_SEAMS

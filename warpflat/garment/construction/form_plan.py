@@ -10,16 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.core import InputError, find_unused_name, nearest
+from warpflat.garment.construction.edges import Place
 from warpflat.pattern import HEMMED_LEVELS, EdgeRules, Seam, SeamSide
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.forms import FormResult
 
-__all__ = ["EdgePlan", "FormPlan", "Sides", "check_fold_grain", "find_fold_lines", "plan_form"]
-
-Sides = tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]]
-#: Names of a piece and of its edge.
-Place = tuple[str, str]
+__all__ = ["EdgePlan", "FormPlan", "check_fold_grain", "find_fold_lines", "plan_form"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -263,7 +260,7 @@ def _plan_seams(
         hub = next((side[0] for side in both if side[0].place in sewing.hubs), None)
         of_form.append((number, 0) if hub is None else (hub.place, 1 - hub.side))
         if hub is None:
-            sides: Sides = (chain(both[0]), chain(both[1]))
+            sides = chain(both[0]), chain(both[1])
         else:
             around = [chain(sewing.partners(s), turned=s.against) for s in sewing.by_edge[hub.place]]
             sides = (sum(around, ()), (SeamSide(piece=hub.piece, edge=hub.edge),))

@@ -207,9 +207,12 @@ def _openings(garment: FormGarment, sign: float) -> Iterator[ViewedPiece]:
             continue
         parts = place_opening(garment.form, opening, garment.positions)
         end = min(opening.start + opening.length, sum(part.whole for part in parts))
-        lines = list[FloatArray]()
-        for part in parts:
-            arc = part.before + arc_lengths(garment.positions[part.piece][part.vertices])
+        lines, at_bust = list[FloatArray](), list[float]()
+        arcs = [part.before + arc_lengths(garment.positions[part.piece][part.vertices]) for part in parts]
+        for part, arc in zip(parts, arcs, strict=True):
+            on_bust = np.isin(garment.form.pieces[part.piece].grid_vertices[part.vertices], bust)
+            at_bust += arc[on_bust].tolist()
+        for part, arc in zip(parts, arcs, strict=True):
             seen = garment.form.pieces[part.piece].surface.vertices[part.vertices, :2] * [sign, 1.0]
             # A side seam is the outline of both views.
             if _towards(garment, part.piece, part.vertices, sign).mean() < _EDGE_ON:
@@ -224,9 +227,7 @@ def _openings(garment: FormGarment, sign: float) -> Iterator[ViewedPiece]:
             if opening.kind == "zip":
                 shapes += [(float(tooth), _BAR / 3) for tooth in np.arange(opening.start, end, _TOOTH)]
             if opening.kind == "buttons":
-                grid = garment.form.pieces[part.piece].grid_vertices
-                at_bust = arc[np.isin(grid[part.vertices], bust)]
-                depths = button_depths(opening, end, float(at_bust[0]) if len(at_bust) else None)
+                depths = button_depths(opening, end, next(iter(at_bust), None))
                 shapes = [(depth, 0.5 * opening.button * _CIRCLE) for depth in depths.tolist()]
             for at, shape in shapes:
                 if arc[0] <= at <= arc[-1]:

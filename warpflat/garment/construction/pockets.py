@@ -21,8 +21,8 @@ from warpflat.core import (
 )
 from warpflat.garment.construction.details import PocketTable
 from warpflat.garment.construction.edges import (
+    above_and_below,
     backwards,
-    beside,
     copies_sewn,
     downwards,
     drawn_on,
@@ -33,6 +33,7 @@ from warpflat.garment.construction.edges import (
     new_piece,
     polygon_edges,
     redrawn,
+    runs_down,
     sewn,
     trimmed,
     up_and_across,
@@ -203,8 +204,7 @@ def _cut_hip_pocket(pattern: Pattern, pocket: PocketTable, front: SeamSide) -> P
     facing, bag = (free_piece_name(pattern, f"{front.piece}_pocket_{what}") for what in ("facing", "bag"))
     opening = find_unused_name("pocket opening", {edge.name for edge in sample.edges})
     # The upper edge comes before the side's where that runs downwards.
-    first = downwards(sample, front.edge)[1]
-    upper = beside(sample, front.edge)[0 if first else 1]
+    first, upper = runs_down(sample, sample.edge(front.edge).points), above_and_below(sample, front.edge)[0]
     names = opening, facing, bag
     pattern = redrawn(
         pattern, front.piece, lambda piece: _hip_pocket(piece, pocket, upper, front.edge, names, first=first)
