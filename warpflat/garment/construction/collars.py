@@ -188,10 +188,10 @@ def _with_stand(pattern: Pattern, chain: FreeChain, collar: FinishingTable) -> P
     pattern = added(pattern, draw)
     if collar.style != "shirt":
         return _sewn_on(pattern, chain, stand)
-    pattern = copies_sewn(pattern, f"{_words(fall)} edge", fall, *_AROUND)
+    pattern = copies_sewn(pattern, f"{fall} edge", fall, *_AROUND)
     upper_side = SeamSide(piece=stand, edge="upper", reversed=True)
     pattern = sewn(pattern, "collar to its stand", SeamSide(piece=fall, edge="lower"), upper_side, notches=(0.5,))
-    pattern = copies_sewn(pattern, f"{_words(stand)} right end", stand, "right end")
+    pattern = copies_sewn(pattern, f"{stand} right end", stand, "right end")
     return _sewn_on(pattern, chain, stand, ("left end",))
 
 
@@ -317,14 +317,11 @@ def _piece(
     try:
         return new_piece(name, like, edges, role, quantity=quantity, paired=paired, grain=grain)
     except InputError:
-        raise InputError(f"no {_words(name)} of these measures can be drawn along this neckline") from None
+        words = name.replace("_", " ")
+        raise InputError(f"no {words} of these measures can be drawn along this neckline") from None
 
 
 def _sewn_on(pattern: Pattern, chain: FreeChain, name: str, layers: tuple[str, ...] = _AROUND) -> Pattern:
     """Return a pattern with both layers of a collar sewn to each other and its lower edge to the neckline."""
-    pattern = copies_sewn(pattern, f"{_words(name)} {'edge' if len(layers) > 1 else layers[0]}", name, *layers)
-    return sewn(pattern, _words(name), SeamSide(piece=name, edge="lower"), chain.sides)
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
+    pattern = copies_sewn(pattern, f"{name} {'edge' if len(layers) > 1 else layers[0]}", name, *layers)
+    return sewn(pattern, name, SeamSide(piece=name, edge="lower"), chain.sides)

@@ -269,12 +269,12 @@ def sewn(pattern: Pattern, name: str, first: Sides, second: Sides, **how: Any) -
 
     Args:
         pattern: with its pieces.
-        name: what the seam is to be called.
+        name: what the seam is to be called, in words or as a piece is.
         first, second: its sides.
         how: other attributes of a :class:`Seam`.
     """
     rows = [(row,) if isinstance(row, SeamSide) else row for row in (first, second)]
-    name = find_unused_name(name, {seam.name for seam in pattern.seams})
+    name = find_unused_name(name.replace("_", " "), {seam.name for seam in pattern.seams})
     return replace(pattern, seams=[*pattern.seams, Seam(name=name, sides=(rows[0], rows[1]), **how)])
 
 

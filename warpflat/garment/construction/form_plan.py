@@ -117,14 +117,11 @@ def _plan_edges(form: FormResult, name: str, sewing: _SewnEdges, rules: EdgeRule
     heights = {
         edge: float(np.mean(piece.surface.vertices[ids][:, 1]))
         for edge, ids in piece.edges.items()
-        if piece.parts.get(edge, edge) == edge
-        and edge.split(" ")[0] in HEMMED_LEVELS
-        and not sewing.covers((name, edge))
+        if piece.whole(edge) == edge and edge.split(" ")[0] in HEMMED_LEVELS and not sewing.covers((name, edge))
     }
     lowest = min(heights, key=lambda edge: heights[edge], default=None)
-    legs = {leg for dart in piece.darts.values() for leg in dart}
     for edge, ids in piece.edges.items():
-        whole = piece.parts.get(edge, edge)
+        whole = piece.whole(edge)
         parts = sewing.parts((name, edge), len(ids))
         # The edge's own name stays with what is sewn.
         keeper = next((number for number, (_, _, sewn) in enumerate(parts) if sewn), 0)
@@ -132,7 +129,7 @@ def _plan_edges(form: FormResult, name: str, sewing: _SewnEdges, rules: EdgeRule
             part = edge if number == keeper else find_unused_name(edge, taken)
             taken.add(part)
             kind = "seam" if sewn else "fold" if edge == piece.fold else "hem" if whole == lowest else "seam"
-            kind = "dart" if edge in legs else rules.kind(name, part, kind, whole=whole)
+            kind = "dart" if edge in piece.leg_edges else rules.kind(name, part, kind, whole=whole)
             plans.append(EdgePlan(name=part, source=edge, whole=whole, first=first, last=last, kind=kind))
     return tuple(plans)
 

@@ -139,6 +139,11 @@ class FormResult:
         """Return the legs of every dart that the pieces have, by piece and dart; half pieces have those on the left."""
         return {(name, dart): legs for name, piece in self.pieces.items() for dart, legs in piece.legs().items()}
 
+    def seam_of_edges(self) -> dict[tuple[str, str], str]:
+        """Return the seams of the edges that are sewn, by piece and edge."""
+        runs = [(seam, run.edges) for seam in self.seams for run in seam.runs]
+        return {place: seam.name for seam, edges in runs for place in zip(seam.pieces, edges, strict=True)}
+
     def differs_by_darts(self, body: FloatArray, form: Form, half: bool) -> bool:
         """Return whether another form on a body is this one with other darts, if any."""
         return body is self.body and half == self.half and replace(form, darts=self.recipe.darts) == self.recipe
