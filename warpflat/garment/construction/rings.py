@@ -156,19 +156,15 @@ def find_rings(
         if chain[0] == chain[-1]:
             length = sum(free[min(pair), max(pair)] for pair in itertools.pairwise(chain))
             rings.append((np.array(chain[:-1], dtype=np.int32), length))
-    found = dict[str, tuple[IntArray, float]]()
-    for ring in sorted(rings, key=lambda ring: -ring[1]):
-        found[find_unused_name(_ring_line(mannequin, ring[0]), found)] = ring
-    return found
-
-
-def _ring_line(mannequin: Mannequin, ring: IntArray) -> str:
-    """Return the closed line of the mannequin that a ring lies on, or the one whose middle is nearest to the ring's."""
+    # Each lies on the closed line of the mannequin whose middle is nearest to its own.
     limbs = (*ARM_LEVELS, *LEG_LINES.values())
     names = ["neck", *RING_LEVELS, *(f"{level} {side}" for level in limbs for side in ("left", "right"))]
-    middle = mannequin.vertices[ring].mean(axis=0)
-    middles = {name: mannequin.line(name)[:-1].mean(axis=0) for name in names}
-    return min(names, key=lambda name: float(np.linalg.norm(middles[name] - middle)))
+    middles = np.array([mannequin.line(name)[:-1].mean(axis=0) for name in names])
+    found = dict[str, tuple[IntArray, float]]()
+    for ring, length in sorted(rings, key=lambda ring: -ring[1]):
+        away = np.linalg.norm(middles - mannequin.vertices[ring].mean(axis=0), axis=1)
+        found[find_unused_name(names[int(away.argmin())], found)] = ring, length
+    return found
 
 
 def rings_line(rings: Sequence[Mapping[str, Any]]) -> str:
