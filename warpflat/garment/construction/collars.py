@@ -317,8 +317,7 @@ def _piece(
     try:
         return new_piece(name, like, edges, role, quantity=quantity, paired=paired, grain=grain)
     except InputError:
-        words = name.replace("_", " ")
-        raise InputError(f"no {words} of these measures can be drawn along this neckline") from None
+        raise InputError(f"no {name.replace('_', ' ')} of these measures can be drawn along this neckline") from None
 
 
 def _sewn_on(pattern: Pattern, chain: FreeChain, name: str, layers: tuple[str, ...] = _AROUND) -> Pattern:

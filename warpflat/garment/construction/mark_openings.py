@@ -104,18 +104,18 @@ def _with_opening(
         if seam.openings:
             raise InputError(f"{seam.name!r} has another opening; a wrap is open all along it")
         return _with_wrap(pattern, seam, opening)
-    ends = _reach(opening, part)[1] < part.whole
+    end = _reach(opening, part)[1]
     if opening.kind != "godet":
         opened = SeamOpening(
-            kind=opening.kind, length=_length(opening, parts[pattern.sample]), begin=opening.start - part.before, whole=not ends,
+            kind=opening.kind, length=_length(opening, parts[pattern.sample]), begin=opening.start - part.before, whole=end >= part.whole,
             style=opening.style if opening.kind == "zip" else "",
         )  # fmt: skip
         seam = replace(seam, openings=(*seam.openings, opened))
         pattern = _with_seam(pattern, seam)
     if opening.kind == "zip":
-        return _with_zip(pattern, seam, opening, parts, ends=ends)
+        return _with_zip(pattern, seam, opening, parts)
     if opening.kind == "buttons":
-        return _with_buttons(pattern, seam, opening, parts, depths, ends=ends)
+        return _with_buttons(pattern, seam, opening, parts, depths)
     if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0:
         raise InputError(f"a {opening.kind} begins at the lower end of a seam between two edges")
     for side in [side for side in seam.stretches if not side.mirrored]:
@@ -159,7 +159,7 @@ def _with_seam(pattern: Pattern, seam: Seam) -> Pattern:
     return replace(pattern, seams=[seam if each.name == seam.name else each for each in pattern.seams])
 
 
-def _with_zip(pattern: Pattern, seam: Seam, opening: OpeningTable, parts: _Parts, *, ends: bool) -> Pattern:
+def _with_zip(pattern: Pattern, seam: Seam, opening: OpeningTable, parts: _Parts) -> Pattern:
     """Return a pattern with the line of a zip beside the edges of a seam, and a notch where it ends, if it does within the seam."""
     import shapely
 
@@ -182,7 +182,7 @@ def _with_zip(pattern: Pattern, seam: Seam, opening: OpeningTable, parts: _Parts
             if not side.mirrored:
                 pattern = redrawn(pattern, side.piece, beside_edge)
             passed = {size: past + edge_at(pattern, side, size).length for size, past in passed.items()}
-    if not ends:
+    if seam.openings[-1].whole:
         return pattern
     return with_notches(pattern, seam, {size: [_reach(opening, _part_of(row, seam))[1]] for size, row in parts.items()})
 
@@ -223,13 +223,7 @@ def _button_depths(pattern: Pattern, opening: OpeningTable, parts: _Parts) -> di
 
 
 def _with_buttons(
-    pattern: Pattern,
-    seam: Seam,
-    opening: OpeningTable,
-    parts: _Parts,
-    depths: Mapping[str, FloatArray],
-    *,
-    ends: bool,
+    pattern: Pattern, seam: Seam, opening: OpeningTable, parts: _Parts, depths: Mapping[str, FloatArray]
 ) -> Pattern:
     """Return a pattern with a button stand on both sides of a seam, which is sewn only below it, if the stand ends within the seam."""
     if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0:
@@ -244,7 +238,9 @@ def _with_buttons(
         return with_button_stand(piece, edge, opening, end if end < part.whole else np.inf, here)
 
     places = dict.fromkeys(side.place for side in seam.stretches)
-    pattern = replace(pattern, seams=[each for each in pattern.seams if each.name != seam.name or ends])
+    pattern = replace(
+        pattern, seams=[each for each in pattern.seams if each.name != seam.name or not seam.openings[-1].whole]
+    )
     return with_pieces(pattern, [buttoned(piece, edge) for name, edge in places for piece in in_sizes(pattern, name)])
 
 
