@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,6 @@ from warpflat.garment import Garment, garment_files
 from warpflat.pattern import pattern_names
 
 if TYPE_CHECKING:
-    from warpflat.flat import Flattening
     from warpflat.garment import Drape
 
 __all__ = ["drape_names", "drape_scene", "write_drape"]
@@ -92,12 +91,19 @@ def write_drape(
     return metrics, files, notes
 
 
-def drape_scene(scene: Scene, garment: Garment | Flattening, *, device: str | None = None) -> Drape:
-    """Drape a scene's garment or piece by the settings of its `[drape]` table, or by the defaults.
+def drape_scene(
+    scene: Scene,
+    garment: Garment,
+    *,
+    callback: Callable[[int, float], None] | None = None,
+    device: str | None = None,
+) -> Drape:
+    """Drape a scene's garment by the settings of its `[drape]` table, or by the defaults.
 
     Args:
         scene: the scene.
         garment: flattened.
+        callback: called with the number of steps and the residual now and then.
         device: Warp device.
 
     Raises:
@@ -110,5 +116,5 @@ def drape_scene(scene: Scene, garment: Garment | Flattening, *, device: str | No
     with errors_named(scene.where):
         return drape(
             garment, hold=table.hold, elastics=[each.edge for each in scene.settings.finishing if each.elastic],
-            options=table.options(), device=device or scene.settings.device,
+            options=table.options(), callback=callback, device=device or scene.settings.device,
         )  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from warpflat.app.scene.cuts import CutSequence, cut_of_dart, plan_automatic_cuts, plan_cuts
@@ -55,7 +55,6 @@ from warpflat.garment import (
     cap_wishes,
     check_edge_names,
     check_fold_grain,
-    dart_along,
     find_fold_lines,
     flatten_form,
     garment_as_cut,
@@ -63,7 +62,6 @@ from warpflat.garment import (
     plan_form,
     seam_ratios,
     seam_words,
-    select_bricks,
     sew_pieces,
     sewn_centres,
     sized_opening,
@@ -341,12 +339,6 @@ class GarmentPlan(Plan):
             built = scene_form(self.scene, self.mannequin, strain_limit=scene_fabric(scene).strain_limit)
         return plan_garment(scene, device=self.device, built=built)
 
-    @cached_property
-    def bricks(self) -> dict[str, list[str]]:
-        """The bricks of every piece, on both sides of the body."""
-        recipe = self.form.recipe
-        return {name: select_bricks(self.mannequin.layout, piece.bricks) for name, piece in recipe.pieces.items()}
-
     def advise(self, piece: Flattening) -> Flattening:
         """Return a piece with cuts that would help, each with the table of a scene's `[[cuts]]` that makes it, if one can."""
         name, advised = piece.surface.name, advise(piece)
@@ -355,7 +347,7 @@ class GarmentPlan(Plan):
         for remedy in advised.remedies:
             row = cloth.grid_vertices[remedy.path]
             title = without_side(remedy.words.split(",")[0].removeprefix("a "))
-            dart = dart_along(self.mannequin.layout, self.form.vertices, self.bricks[name], row, piece=name, name=title)
+            dart = self.form.dart_along(name, row, title)
             table = None if dart is None or row[-1] in on_fold else cut_of_dart(dart)
             remedies.append(replace(remedy, table=table))
         return advised.with_remedies(remedies) if remedies else advised

@@ -14,7 +14,15 @@ import numpy as np
 from warpflat.core import FloatArray, InputError, IntArray, check_file_name, nearest, quote_value, same_file, short_repr
 from warpflat.garment.mannequin.blend import Adjustment, adjusted_vertices, blend_forms, is_tight
 from warpflat.garment.mannequin.bricks import select_bricks
-from warpflat.garment.mannequin.darts import FormDart, PlacedDart, place_darts
+from warpflat.garment.mannequin.darts import (
+    FormDart,
+    PlacedDart,
+    dart_along,
+    dart_part,
+    dart_rows,
+    place_darts,
+    usual_darts,
+)
 from warpflat.garment.mannequin.ease import ease_from
 from warpflat.garment.mannequin.form_seams import FormSeam, find_seams
 from warpflat.garment.mannequin.layout import RING_LEVELS
@@ -120,6 +128,8 @@ class FormResult:
         ease: by level, what it asks for [cm]; without levels that have another one's outline or lie between ruled or bridged ones.
         recipe, body, half: what it was built from.
         notes: what was changed for this body, one sentence each.
+        layout: the mannequin's.
+        bricks: of the recipe's pieces by name, on both sides of the body.
     """
 
     __repr__ = short_repr
@@ -134,10 +144,28 @@ class FormResult:
     darts: tuple[PlacedDart, ...] = ()
     ease: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    layout: Layout = field(repr=False)
+    bricks: Mapping[str, Sequence[str]] = field(repr=False)
 
     def legs(self) -> dict[tuple[str, str], tuple[IntArray, IntArray]]:
         """Return the legs of every dart that the pieces have, by piece and dart; half pieces have those on the left."""
         return {(name, dart): legs for name, piece in self.pieces.items() for dart, legs in piece.legs().items()}
+
+    def usual_darts(self) -> tuple[FormDart, ...]:
+        """Return every dart that a book knows in the pieces; see :func:`warpflat.garment.mannequin.darts.usual_darts`."""
+        return usual_darts(self.layout, self.vertices, self.bricks)
+
+    def dart_along(self, piece: str, row: IntArray, name: str) -> FormDart | None:
+        """Return the dart that slits a row of the mannequin's vertices; see :func:`warpflat.garment.mannequin.darts.dart_along`."""
+        return dart_along(self.layout, self.vertices, self.bricks[piece], row, piece=piece, name=name)
+
+    def dart_rows(self, dart: FormDart) -> list[tuple[str, IntArray]]:
+        """Return what a dart slits, by piece; see :func:`warpflat.garment.mannequin.darts.dart_rows`."""
+        return dart_rows(self.layout, self.vertices, self.bricks, dart)
+
+    def dart_part(self, dart: PlacedDart) -> tuple[float, float]:
+        """Return which part of its line a dart takes; see :func:`warpflat.garment.mannequin.darts.dart_part`."""
+        return dart_part(self.layout, self.vertices, self.bricks[dart.piece], dart)
 
     def differs_by_darts(self, body: FloatArray, form: Form, half: bool) -> bool:
         """Return whether another form on a body is this one with other darts, if any."""
@@ -324,7 +352,7 @@ def realise(
     }
     return FormResult(
         name=form.name, recipe=form, body=body, half=half,
-        vertices=vertices, pieces=pieces, seams=find_seams(pieces), darts=placed, ease=ease,
+        vertices=vertices, pieces=pieces, seams=find_seams(pieces), darts=placed, ease=ease, layout=layout, bricks=bricks,
     )  # fmt: skip
 
 
