@@ -3,7 +3,6 @@
 from .construction.as_cut import garment_as_cut as garment_as_cut
 from .construction.as_cut import read_cut_pattern as read_cut_pattern
 from .construction.border_seams import surface_seams as surface_seams
-from .construction.carry import carry as carry
 from .construction.constraints import Constraint as Constraint
 from .construction.constraints import FixedLength as FixedLength
 from .construction.constraints import Straight as Straight
@@ -33,11 +32,7 @@ from .construction.form_plan import plan_form as plan_form
 from .construction.garment import Garment as Garment
 from .construction.garment_files import garment_files as garment_files
 from .construction.garment_files import surface_files as surface_files
-from .construction.graded import graded_layout as graded_layout
-from .construction.graded import stretches_worn as stretches_worn
 from .construction.level_ease import EASE_LEVELS as EASE_LEVELS
-from .construction.level_ease import level_ease as level_ease
-from .construction.level_ease import widened as widened
 from .construction.openings import part_at_centres as part_at_centres
 from .construction.openings import sewn_centres as sewn_centres
 from .construction.openings import sized_opening as sized_opening
@@ -49,8 +44,6 @@ from .construction.sew_pieces import unsewn_notes as unsewn_notes
 from .construction.sewing import sew as sew
 from .construction.sewn_panels import SewnPanel as SewnPanel
 from .construction.sewn_panels import read_sewn_panels as read_sewn_panels
-from .construction.sewn_panels import sewn_panels as sewn_panels
-from .construction.sewn_panels import with_cuts as with_cuts
 from .construction.to_pattern import LACKING as LACKING
 from .construction.to_pattern import check_edge_names as check_edge_names
 from .construction.to_pattern import pattern_of_garment as pattern_of_garment
@@ -76,7 +69,6 @@ from .draping.result import Drape as Drape
 from .draping.write import files_of_drape as files_of_drape
 from .draping.write import save_drape as save_drape
 from .draping.write import write_drape_files as write_drape_files
-from .mannequin.body_model import finer_body as finer_body
 from .mannequin.bricks import TRUNK_LEVELS as TRUNK_LEVELS
 from .mannequin.card import needed_measurements as needed_measurements
 from .mannequin.card import write_measurement_card as write_measurement_card
@@ -115,12 +107,13 @@ from .mannequin.shapes import shaped_form as shaped_form
 from .mannequin.table import MannequinTable as MannequinTable
 from .mannequin.table import mannequin_from_table as mannequin_from_table
 from .mannequin.usd import write_mannequin_usd as write_mannequin_usd
-from .seams.by_hand import plane_curves as plane_curves
+from .seams.another_body import BESIDE as BESIDE
+from .seams.another_body import Carried as Carried
+from .seams.another_body import FitJob as FitJob
 from .seams.find import GRAIN as GRAIN
 from .seams.find import FoundSeams as FoundSeams
 from .seams.find import find_seams as find_seams
 from .seams.find import seam_words as seam_words
-from .seams.layers import GarmentFile as GarmentFile
 from .seams.layers import read_garment as read_garment
 from .seams.layers import read_layers as read_layers
 from .seams.options import NO_PATTERN as NO_PATTERN

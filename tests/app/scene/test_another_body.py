@@ -13,13 +13,14 @@ import trimesh
 from bodies import body_of_size, mean_person
 from command import Command
 
-from warpflat.app.scene.fit import STUDY_FILES, FitJob, Fitted, ease_wishes, fit_to, study_table
+from warpflat.app.scene.fit import STUDY_FILES, Fitted, ease_wishes, fit_to, keeps_pattern, study_table
 from warpflat.core.errors import InputError
 from warpflat.core.output import refuse_to_replace_others
 from warpflat.garment.construction.file_seams import file_seams
 from warpflat.garment.construction.sewn_panels import read_sewn_panels
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation
 from warpflat.garment.mannequin.closest import Mesh
+from warpflat.garment.seams.another_body import FitJob
 from warpflat.garment.seams.layers import read_garment
 
 BARE = ("--frames", "0", "--no-picture", "--quiet")
@@ -93,8 +94,8 @@ def test_a_known_pattern_is_graded_and_keeps_its_grain(tmp_path: Path):
     """Panels that are measured in millimetres, as of Style3D: 480 mm wide each, as much wider as the skirt is."""
     _skirt(tmp_path / "skirt.obj", measured=1e3)
     job = FitJob.start(tmp_path / "skirt.obj", units="m", body="EU 36")
-    assert job.keeps_pattern({})
-    assert not job.keeps_pattern({"find_seams": {"find": "auto"}})
+    assert keeps_pattern(job, {})
+    assert not keeps_pattern(job, {"find_seams": {"find": "auto"}})
     result = fit_to(
         job, job.to("EU 42", {}), {"output": {"frames": 0, "picture": False}}, tmp_path / "out", name="skirt"
     )

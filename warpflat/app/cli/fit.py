@@ -110,16 +110,16 @@ def fit(
     from warpflat.app.cli.progress_bar import ProgressBar
     from warpflat.app.scene.fit import (
         STUDY_FILES,
-        Carried,
-        FitJob,
         Fitted,
         check_tables,
         ease_wishes,
         fit_to,
+        keeps_pattern,
         study_table,
         write_study,
     )
     from warpflat.app.scene.options import scene_tables
+    from warpflat.garment import Carried, FitJob
 
     ease = ease_wishes(eases)
     if len(set(bodies)) < len(bodies):
@@ -156,7 +156,7 @@ def fit(
             result = fit_to(job, one, tables, to, name=name, device=output.device, on_progress=bar)
         kept = (
             [f"its own pattern is kept, and graded by the growth of the cloth; {_ANEW}"]
-            if job.keeps_pattern(tables)
+            if keeps_pattern(job, tables)
             else []
         )
         told = [*([*job.notes, *kept] if output.tells and one is carried[0] else ()), *one.notes]

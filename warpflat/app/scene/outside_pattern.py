@@ -14,16 +14,13 @@ from warpflat.app.scene.load import errors_named, expand_variables
 from warpflat.app.scene.run import SceneResult
 from warpflat.app.scene.schema import DrapeTable
 from warpflat.core import InputError, Table, check_table, format_count, make_file_name, read_json, read_toml
-from warpflat.garment import MannequinTable, mannequin_from_table
+from warpflat.garment import BESIDE, MannequinTable, mannequin_from_table
 
 if TYPE_CHECKING:
     from warpflat.garment import Correction, Lift, Mannequin
     from warpflat.pattern import Pattern, Piece, Seam
 
-__all__ = ["BESIDE", "OutsideJob", "SewingTable", "drape_outside", "edge_table", "is_pattern_file"]
-
-#: A garment lies on a body if half of its cloth, or of its borders, is nearer to it than this [m].
-BESIDE = 0.2
+__all__ = ["OutsideJob", "SewingTable", "drape_outside", "edge_table", "is_pattern_file"]
 
 
 class SewnSeamTable(Table):
