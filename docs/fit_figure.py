@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import warpflat
-from warpflat.garment.seams.another_body import FitJob
+from warpflat.app.scene.fit import read_job
 from warpflat.pattern.export.dressed import Body, dress
 from warpflat.pattern.export.figure import drawn_page
 from warpflat.pattern.export.views import View, draw_row
@@ -31,7 +31,7 @@ def main(file: str) -> None:
         path = Path(folder) / "tshirt.obj"
         rows = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in form.vertices.tolist()]
         path.write_text("\n".join([*rows, *("f " + " ".join(str(v + 1) for v in f) for f in faces.tolist()), ""]))
-        job = FitJob.start(path, units="m", body=BODIES[0])
+        job = read_job(path, units="m", body=BODIES[0])
         with drawn_page(file, 11.0, 3.9, dpi=110) as pen:
             for number, body in enumerate(BODIES):
                 carried = job.to(body, {})

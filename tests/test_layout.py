@@ -45,7 +45,7 @@ ROOMS = {
     "mannequin": "core surface drafting export kernels",
     "construction": "core surface fabric model solver drafting export flattening cutting mannequin kernels",
     "draping": "core surface fabric model solver drafting export flattening mannequin construction kernels",
-    "seams": "core surface fabric model solver drafting flattening cutting mannequin construction",
+    "seams": "core surface fabric model solver drafting flattening cutting construction",
     "review": "core surface export",
     "scene": "core surface fabric model solver drafting export flattening cutting mannequin construction draping seams review",
     "batch": "core surface fabric model solver drafting export flattening cutting mannequin construction draping seams review scene",

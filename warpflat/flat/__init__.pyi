@@ -60,7 +60,6 @@ from .flattening.progress import Progress as Progress
 from .flattening.progress import laid_stage as laid_stage
 from .flattening.progress import make_stage as make_stage
 from .flattening.progress import make_stages as make_stages
-from .flattening.progress import relaxation_words as relaxation_words
 from .flattening.result import Flattening as Flattening
 from .flattening.result import run_metrics as run_metrics
 from .flattening.step_by_step import RelaxationStep as RelaxationStep

@@ -1,7 +1,9 @@
 """Garments: bodies and forms, sewing, finishing, seams that are found, draping."""
 
+from .construction.another_body import BESIDE as BESIDE
+from .construction.another_body import Carried as Carried
+from .construction.another_body import FitJob as FitJob
 from .construction.as_cut import garment_as_cut as garment_as_cut
-from .construction.as_cut import read_cut_pattern as read_cut_pattern
 from .construction.border_seams import surface_seams as surface_seams
 from .construction.constraints import Constraint as Constraint
 from .construction.constraints import FixedLength as FixedLength
@@ -37,7 +39,6 @@ from .construction.openings import part_at_centres as part_at_centres
 from .construction.openings import sewn_centres as sewn_centres
 from .construction.openings import sized_opening as sized_opening
 from .construction.pulled_on import wide_enough as wide_enough
-from .construction.rings import rings_line as rings_line
 from .construction.sew_pieces import name_seams as name_seams
 from .construction.sew_pieces import sew_pieces as sew_pieces
 from .construction.sew_pieces import unsewn_notes as unsewn_notes
@@ -57,8 +58,7 @@ from .draping.drape_pattern import drape_pattern as drape_pattern
 from .draping.drape_pattern import place_drafted as place_drafted
 from .draping.lift import Lift as Lift
 from .draping.lift import moved_lift as moved_lift
-from .draping.lift import read_lift as read_lift
-from .draping.lift import surface_lift as surface_lift
+from .draping.lift import read_lifted as read_lifted
 from .draping.moved_pattern import moved_outlines as moved_outlines
 from .draping.options import DrapeOptions as DrapeOptions
 from .draping.picture import write_compared_drapes as write_compared_drapes
@@ -70,7 +70,6 @@ from .draping.write import files_of_drape as files_of_drape
 from .draping.write import save_drape as save_drape
 from .draping.write import write_drape_files as write_drape_files
 from .mannequin.bricks import TRUNK_LEVELS as TRUNK_LEVELS
-from .mannequin.card import needed_measurements as needed_measurements
 from .mannequin.card import write_measurement_card as write_measurement_card
 from .mannequin.closest import Mesh as Mesh
 from .mannequin.common_body import CommonBody as CommonBody
@@ -107,9 +106,7 @@ from .mannequin.shapes import shaped_form as shaped_form
 from .mannequin.table import MannequinTable as MannequinTable
 from .mannequin.table import mannequin_from_table as mannequin_from_table
 from .mannequin.usd import write_mannequin_usd as write_mannequin_usd
-from .seams.another_body import BESIDE as BESIDE
-from .seams.another_body import Carried as Carried
-from .seams.another_body import FitJob as FitJob
+from .seams.by_hand import plane_curves as plane_curves
 from .seams.find import GRAIN as GRAIN
 from .seams.find import FoundSeams as FoundSeams
 from .seams.find import find_seams as find_seams

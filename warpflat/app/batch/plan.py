@@ -15,6 +15,7 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from warpflat._version import __version__
+from warpflat.app.scene.as_toml import laid_over
 from warpflat.app.scene.load import Scene, errors_named, expand_variables, make_scene
 from warpflat.app.scene.schema import PATH_KEYS
 from warpflat.core import InputError, Table, check_table, file_digest, quote_value, read_toml, with_plain_letters
@@ -185,7 +186,7 @@ def _make_task(
             data = data | {"mannequin": body}
         if entry.fabric is not None:
             data = data | {"fabric": entry.fabric}
-        data = _merge(data, _with_absolute_paths(entry.override, folder))
+        data = laid_over(data, _with_absolute_paths(entry.override, folder), joins=False)
         scene = make_scene(data, name=name, folder=folder, where=where)
         settings = scene.settings
         # The key is a hash of the version, the resolved scene, and the contents of the files that it names. Digests stand
@@ -239,15 +240,6 @@ def _path(file: str, folder: Path) -> str:
 def _table(data: Mapping[str, Any], key: str) -> Mapping[str, Any]:
     found = data.get(key)
     return found if isinstance(found, Mapping) else {}
-
-
-def _merge(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Return tables with those of `over` merged in."""
-    merged = dict(data)
-    for key, value in over.items():
-        below = merged.get(key)
-        merged[key] = _merge(below, value) if isinstance(below, Mapping) and isinstance(value, Mapping) else value
-    return merged
 
 
 def _label(override: Mapping[str, Any]) -> str:

@@ -115,11 +115,12 @@ def fit(
         ease_wishes,
         fit_to,
         keeps_pattern,
+        read_job,
         study_table,
         write_study,
     )
     from warpflat.app.scene.options import scene_tables
-    from warpflat.garment import Carried, FitJob
+    from warpflat.garment import Carried
 
     ease = ease_wishes(eases)
     if len(set(bodies)) < len(bodies):
@@ -139,9 +140,7 @@ def fit(
     check_tables(tables, garment, drawn)
     refuse_to_replace_others(folder, STUDY_FILES)
     start_warp_silently()
-    job = FitJob.start(
-        garment, units=options["units"], prim=options["prim"], name=name, front=options["front"], body=body
-    )
+    job = read_job(garment, units=options["units"], prim=options["prim"], name=name, front=options["front"], body=body)
     # Every body is built before the first pattern, so that a wrong one is refused at once.
     sources, carried = list(job.sources), list[Carried]()
     with listening_to_reads(sources.append):

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
-from warpflat.app.review.figures import seam_figures
+from warpflat.app.review.figures import relaxation_words, seam_figures
 from warpflat.core import aligned, energy_words
 from warpflat.flat import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_names
 
@@ -24,6 +24,7 @@ __all__ = [
     "ledger_table",
     "mannequin_table",
     "measures_table",
+    "rings_line",
     "run_summary",
 ]
 
@@ -60,8 +61,6 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
             )
         )
     tables = [aligned(head, rows)]
-    from warpflat.flat import relaxation_words
-
     if relaxed := relaxation_words(piece["stages"] for piece in metrics["pieces"].values()):
         tables.append(f"relaxed: {relaxed}")
     if metrics.get("seams"):
@@ -101,8 +100,6 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
             )
         tables.append(f"girths [cm], body / form / pattern (ease): {'; '.join(parts)}")
     if metrics.get("rings"):
-        from warpflat.garment import rings_line
-
         tables.append(rings_line(metrics["rings"]))
     if len(metrics.get("cloths", ())) > 1:
         # What is cut from each of several cloths.
@@ -114,6 +111,19 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
     if taken := metrics.get("pattern_of_file"):
         tables.append(f"pattern: {cut_words(taken)}")
     return "\n\n".join(tables) + f"\n{shlex.quote(folder)}: {', '.join(files)}"
+
+
+def rings_line(rings: Sequence[Mapping[str, Any]]) -> str:
+    """Return the console's line about the entry `rings` of `metrics.json`."""
+    shut = [
+        f"{ring['name']} {ring['opening_needed_mm'] / 10:g} cm ({ring['length_mm'] / 10:.1f} < {ring['over']} {ring['girth_mm'] / 10:.1f})"
+        for ring in rings
+        if ring["passes"] is False
+    ]
+    unknown = [ring["name"] for ring in rings if ring["passes"] is None]
+    parts = [f"need an opening: {', '.join(shut)}"] if shut else []
+    parts += [f"not known: {', '.join(unknown)}"] if unknown else []
+    return f"rings: {'; '.join(parts) or f'all {len(rings)} pass'}"
 
 
 def cut_words(taken: Mapping[str, Any]) -> str:

@@ -21,6 +21,7 @@ from warpflat.core import (
     InputError,
     aligned,
     atomic_path,
+    listening_to_reads,
     nearest,
     quote_value,
 )
@@ -39,6 +40,7 @@ __all__ = [
     "ease_wishes",
     "fit_to",
     "keeps_pattern",
+    "read_job",
     "study_table",
     "write_study",
 ]
@@ -85,6 +87,72 @@ def check_tables(tables: Mapping[str, Any], garment: Path, drawn: Sequence[str] 
     with errors_of_options(garment, drawn):
         given = {**tables, "surface": {"file": str(garment)}}
         scene_fabric(make_scene(given, name="garment", folder=Path(), where=COMMAND_LINE))
+
+
+def read_job(
+    path: Path,
+    *,
+    units: str | None = None,
+    prim: str | None = None,
+    name: str | None = None,
+    front: str | None = None,
+    body: str | None = None,
+) -> FitJob:
+    """Read a garment, and its body, or fit one inside it.
+
+    Args:
+        path, units, prim, name: as :func:`warpflat.garment.seams.layers.read_garment` takes them.
+        front, body: as :meth:`warpflat.garment.construction.another_body.FitJob.start` takes them.
+
+    Raises:
+        InputError: a file cannot be read, is no body, or does not lie in the garment.
+    """
+    from warpflat.garment import FitJob, read_garment
+
+    sources: list[Path] = []
+    with listening_to_reads(sources.append):
+        read = read_garment(path, units=units, prim=prim, name=name)
+        job = FitJob.start(path, read.layers, read.raw, read.scale, name=name, front=front, body=body)
+    return replace(job, sources=tuple(sources))
+
+
+def carry_cuts(job: FitJob, carried: Carried, cuts: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return seams that are drawn on the garment as its file has it, as tables of `[[seams_cut]]` on the carried garment.
+
+    A plane's curves, which are plane on the standing garment only, become lines of the places of the cloth that they cross.
+
+    Raises:
+        InputError: a plane misses the garment.
+    """
+    from warpflat.garment import plane_curves
+
+    onto, now = job.map_to(carried), job.layers_on(carried)
+
+    def moved(places: Sequence[Any]) -> list[Any]:
+        """Return places of the file, points [m] or vertices, on the carried cloth."""
+        points = np.array([place for place in places if not isinstance(place, int)], dtype=float).reshape(-1, 3)
+        there = iter(onto(points).tolist())
+        return [place if isinstance(place, int) else next(there) for place in places]
+
+    found: list[dict[str, Any]] = []
+    for number, cut in enumerate(cuts):
+        plane = cut.get("plane")
+        if plane is None:
+            found.append({key: moved(value) if key in ("points", "line") else value for key, value in cut.items()})
+            continue
+        with errors_named(f"{COMMAND_LINE}: seams_cut[{number}]"):
+            paths = plane_curves(
+                job.surfaces,
+                plane["point"],
+                plane["normal"],
+                towards=plane.get("towards"),
+                nearest=plane.get("nearest", False),
+            )
+        for layer, path in paths:
+            places = [path.place(each) for each in range(len(path.points))]
+            line = [sum(weight * now[layer][vertex] for vertex, weight in place.items()).tolist() for place in places]
+            found.append({**{k: v for k, v in cut.items() if k == "name"}, "line": line, "closed": path.closed})
+    return found
 
 
 def keeps_pattern(job: FitJob, tables: Mapping[str, Any]) -> bool:
@@ -135,8 +203,7 @@ def fit_to(
         try:
             with errors_of_options(copy):
                 if tables.get("seams_cut"):
-                    with errors_named(COMMAND_LINE):
-                        own["seams_cut"] = job.carry_cuts(carried, tables["seams_cut"])
+                    own["seams_cut"] = carry_cuts(job, carried, tables["seams_cut"])
                 scene = make_scene(own, name=name, folder=Path(), where=COMMAND_LINE)
                 with output_folder(out, [*files_of_run(scene), *meshes], sources=job.sources, guard=True) as to:
                     result = run_scene(scene, out, device=device, on_progress=on_progress)

@@ -220,30 +220,13 @@ def edge_table(
 
 def _read(path: Path, table: SewingTable, units: str | None) -> tuple[Pattern, dict[str, Lift], Run]:
     """Return the pattern, the ways to its designed surface, and what its run says of body and girths."""
-    from warpflat.flat import SUFFIXES
-    from warpflat.garment import read_lift, surface_lift
-    from warpflat.pattern import read_pattern
+    from warpflat.garment import read_lifted
 
-    if path.suffix.lower() in SUFFIXES and not path.is_dir():
-        from warpflat.garment import read_cut_pattern
-
-        worn = read_cut_pattern(path, units=units, name=make_file_name(path.stem))
-        return worn.pattern, {name: surface_lift(*each) for name, each in worn.surfaces.items()}, Run()
-    if units is not None:
-        raise InputError(f"--units: is for a mesh whose texture is its pattern; {path} says its own")
     allowance = None if table.allowance_mm is None else 1e-3 * table.allowance_mm
-    folder = path if path.is_dir() else None
-    pattern = read_pattern(path / "pattern.json" if folder else path, allowance=allowance)
-    if folder is None:
-        return pattern, {}, Run()
-    lifts = {
-        piece.name: read_lift(folder / f"{piece.name}.obj")
-        for piece in pattern.pieces[pattern.sample]
-        if (folder / f"{piece.name}.obj").is_file()
-    }
-    if not (folder / "metrics.json").exists():
-        return pattern, lifts, Run()
-    return pattern, lifts, check_table(Run, read_json(folder / "metrics.json"), str(folder / "metrics.json"))
+    pattern, lifts = read_lifted(path, units=units, allowance=allowance)
+    told = path / "metrics.json"
+    run = check_table(Run, read_json(told), str(told)) if path.is_dir() and told.exists() else Run()
+    return pattern, lifts, run
 
 
 def _changed(piece: Piece, entry: SewnPieceTable | None) -> Piece:

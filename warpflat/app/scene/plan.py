@@ -36,7 +36,6 @@ from warpflat.flat import (
     cut_surfaces,
     flatten,
     flatten_all,
-    triangulate,
 )
 from warpflat.garment import (
     CURVES_MM,
@@ -360,13 +359,10 @@ class GarmentPlan(Plan):
 
     def place_drafted(self, garment: Garment, pattern: Pattern) -> Mapping[str, Sequence[Surface]]:
         """See :meth:`Plan.place_drafted`."""
-        from warpflat.garment import place_drafted, surface_lift
+        from warpflat.garment import place_drafted
 
-        lifts = {
-            name: surface_lift(flat.surface.vertices[flat.vertex_origin], flat.positions, triangulate(flat.faces)[0])
-            for name, flat in garment.pieces.items()
-        }
-        return place_drafted(pattern, lifts, self.mannequin, next(iter(garment.pieces.values())).fabric)
+        assert isinstance(garment, FormGarment)
+        return place_drafted(pattern, garment)
 
     @property
     def size(self) -> str:

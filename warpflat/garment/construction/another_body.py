@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -16,13 +16,12 @@ from warpflat.core import (
     FloatArray,
     InputError,
     IntArray,
-    listening_to_reads,
     make_file_name,
     make_piece_name,
     nearest,
     quote_value,
 )
-from warpflat.flat import METRES_PER_UNIT, RawMesh, read_scan, triangulate
+from warpflat.flat import METRES_PER_UNIT, RawMesh, Surface, read_scan, triangulate
 from warpflat.garment.construction.carry import carry
 from warpflat.garment.construction.graded import graded_layout, stretches_worn
 from warpflat.garment.construction.level_ease import level_ease, widened
@@ -32,8 +31,6 @@ from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.common_body import CommonBody
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.scan_pose import ScanOptions
-from warpflat.garment.seams.by_hand import plane_curves
-from warpflat.garment.seams.layers import GarmentFile, read_garment
 
 __all__ = ["BESIDE", "Carried", "FitJob"]
 
@@ -116,7 +113,8 @@ class FitJob:
 
     Attributes:
         path: the garment's file.
-        read: its layers and its mesh.
+        surfaces: its layers, as the file has them.
+        raw: its mesh as it stands, of `scale` metres per unit.
         layers: of the garment, vertices (#V by 3 [m]) in the body's axes, and triangles (#T by 3), outward.
         body: on which it lies.
         turn, shift: points of the file [m] come to the body's axes as points @ turn + shift.
@@ -126,67 +124,66 @@ class FitJob:
     """
 
     path: Path
-    read: GarmentFile
+    surfaces: Sequence[Surface]
+    raw: RawMesh
+    scale: float
     layers: Sequence[tuple[FloatArray, NDArray[np.int64]]]
     body: CommonBody
     turn: FloatArray
     shift: FloatArray
     panels: Sequence[SewnPanel]
     notes: tuple[str, ...]
-    sources: tuple[Path, ...]
+    sources: tuple[Path, ...] = ()
 
     @classmethod
     def start(
         cls,
         path: Path,
+        surfaces: Sequence[Surface],
+        raw: RawMesh,
+        scale: float,
         *,
-        units: str | None = None,
-        prim: str | None = None,
         name: str | None = None,
         front: str | None = None,
         body: str | None = None,
     ) -> FitJob:
-        """Read a garment, and its body, or fit one inside it.
+        """Find the body of a garment that has been read, or fit one inside it.
 
         Args:
-            path, units, prim, name: as :func:`warpflat.garment.seams.layers.read_garment` takes them.
+            path, surfaces, raw, scale: of the garment, see above.
+            name: of its pieces; the file's if not given.
             front: where the front of a garment without a body is, "+z" or "-z", "+x", "-x"; the better of the first two if not given.
             body: a size, or the file of a scan in whose axes the garment lies.
 
         Raises:
-            InputError: a file cannot be read, is no body, or does not lie in the garment.
+            InputError: the body's file cannot be read, is no body, or does not lie in the garment.
         """
         if front is not None and front not in _FRONTS:
             raise InputError(f"--front {quote_value(front)}: {nearest(front, _FRONTS)}")
-        sources: list[Path] = []
-        with listening_to_reads(sources.append):
-            read = read_garment(path, units=units, prim=prim, name=name)
-            points = [layer.vertices for layer in read.layers]
-            corners = [triangulate(layer.faces)[0].astype(np.int64) for layer in read.layers]
-            notes: list[str] = []
-            if body is not None:
-                worn = _common_body(body, "--from")
-                unit = float(np.cbrt(abs(np.linalg.det(worn.turn))))
-                turn, shift = worn.turn / unit, worn.shift
-                layers = _outward(points, corners, turn, shift)
-            else:
-                # The same cloth all around: what fits better is the front.
-                tried = []
-                for axis in [front] if front else ["+z", "-z"]:
-                    cosine, sine = _FRONTS[axis]
-                    turn = np.array([[cosine, 0.0, -sine], [0.0, 1.0, 0.0], [sine, 0.0, cosine]]).T
-                    layers = _outward(points, corners, turn, np.zeros(3))
-                    joined = _joined(layers)
-                    inside = CommonBody.inside(*joined, name="the body inside")
-                    tried.append(
-                        (inside.far * (1.0 if axis in ("+z", front) else _BACKWARDS), axis, turn, layers, inside)
-                    )
-                _, axis, turn, layers, worn = min(tried, key=lambda each: each[0])
-                shift = np.zeros(3)
-                stature = float(np.ptp(worn.vertices[:, 1]))
-                notes.append(
-                    f"a body {stature:.2f} m tall was fitted inside the garment, which faces {axis}; --from BODY says which one it is"
-                )
+        points = [layer.vertices for layer in surfaces]
+        corners = [triangulate(layer.faces)[0].astype(np.int64) for layer in surfaces]
+        notes: list[str] = []
+        if body is not None:
+            worn = _common_body(body, "--from")
+            unit = float(np.cbrt(abs(np.linalg.det(worn.turn))))
+            turn, shift = worn.turn / unit, worn.shift
+            layers = _outward(points, corners, turn, shift)
+        else:
+            # The same cloth all around: what fits better is the front.
+            tried = []
+            for axis in [front] if front else ["+z", "-z"]:
+                cosine, sine = _FRONTS[axis]
+                turn = np.array([[cosine, 0.0, -sine], [0.0, 1.0, 0.0], [sine, 0.0, cosine]]).T
+                layers = _outward(points, corners, turn, np.zeros(3))
+                joined = _joined(layers)
+                inside = CommonBody.inside(*joined, name="the body inside")
+                tried.append((inside.far * (1.0 if axis in ("+z", front) else _BACKWARDS), axis, turn, layers, inside))
+            _, axis, turn, layers, worn = min(tried, key=lambda each: each[0])
+            shift = np.zeros(3)
+            stature = float(np.ptp(worn.vertices[:, 1]))
+            notes.append(
+                f"a body {stature:.2f} m tall was fitted inside the garment, which faces {axis}; --from BODY says which one it is"
+            )
         cloth = np.concatenate([vertices for vertices, _ in layers])
         far = np.linalg.norm(worn.skin.closest(cloth)[2] - cloth, axis=1)
         if np.median(far) > BESIDE:
@@ -195,8 +192,8 @@ class FitJob:
                 "which it was made, in the same axes and place, its unit with --units, or leave --from out"
             )
         return cls(
-            path=path, read=read, layers=layers, body=worn, turn=turn, shift=shift, panels=_known_pattern(read, name or path.stem),
-            notes=tuple(notes), sources=tuple(sources),
+            path=path, surfaces=surfaces, raw=raw, scale=scale, layers=layers, body=worn, turn=turn, shift=shift,
+            panels=_known_pattern(raw, scale, name or path.stem), notes=tuple(notes),
         )  # fmt: skip
 
     def to(self, body: str, ease: Mapping[str, float], *, keep_pose: bool = False) -> Carried:
@@ -218,7 +215,7 @@ class FitJob:
                 vertices=vertices,
                 faces=np.column_stack([triangles, np.full(len(triangles), -1)]).astype(np.int32),
             )
-            for (vertices, triangles), layer in zip(self.layers, self.read.layers, strict=True)
+            for (vertices, triangles), layer in zip(self.layers, self.surfaces, strict=True)
         ]
         moved = [carry(one, self.body.vertices, wearer.vertices, CommonBody.skin_triangles()) for one in cloths]
         faces = [triangles for _, triangles in self.layers]
@@ -257,7 +254,7 @@ class FitJob:
             ]
             cloth, wearer = np.concatenate(moved), replace(wearer, vertices=sits)
         # The mesh as it stands in its file moves as its layers do; what they left out, as buttons, as the nearest cloth.
-        raw = self.read.raw.vertices * self.read.scale @ self.turn + self.shift
+        raw = self.raw.vertices * self.scale @ self.turn + self.shift
         near = cKDTree(was).query(raw)[1]
         back = np.linalg.inv(self.turn)
         return Carried(
@@ -268,71 +265,40 @@ class FitJob:
     def mesh_on(self, carried: Carried, *, patterned: bool) -> RawMesh:
         """Return the file's mesh for a carried garment; its own pattern, if it is kept, is graded by the growth of the cloth."""
         if not patterned:
-            return self.read.raw
+            return self.raw
         # In the unit that the file's own texture has.
         per_unit = METRES_PER_UNIT[self.panels[0].unit]
         cuts = [
             graded_layout(panel.surface, carried.vertices[panel.of_file], panel.cut) / per_unit for panel in self.panels
         ]
-        return with_cuts(self.read.raw, self.panels, cuts)
+        return with_cuts(self.raw, self.panels, cuts)
 
-    def carry_cuts(self, carried: Carried, cuts: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-        """Return seams that are drawn on the garment as its file has it, as tables of `[[seams_cut]]` on the carried garment.
+    def map_to(self, carried: Carried) -> Callable[[FloatArray], FloatArray]:
+        """Return the map from places on the garment, as its file has it, to those on the carried cloth, each #P by 3 [m]."""
+        layers = [(layer.vertices, triangulate(layer.faces)[0].astype(np.int64)) for layer in self.surfaces]
+        cloth, triangles = _joined(layers)
+        worn, there = Mesh(cloth, triangles), np.concatenate(self.layers_on(carried))
 
-        A plane's curves, which are plane on the standing garment only, become lines of the places of the cloth that they cross.
-
-        Raises:
-            InputError: a plane misses the garment.
-        """
-        layers = self.read.layers
-        now = [
-            carried.vertices[cKDTree(self.read.raw.vertices * self.read.scale).query(layer.vertices)[1]]
-            for layer in layers
-        ]
-        cloth, triangles = _joined([(layer.vertices, triangulate(layer.faces)[0].astype(np.int64)) for layer in layers])
-        worn = Mesh(cloth, triangles)
-        everywhere = np.concatenate(now)
-
-        def moved(places: Sequence[Any]) -> list[Any]:
-            """Return places of the file, points [m] or vertices, on the carried cloth."""
-            points = np.array([place for place in places if not isinstance(place, int)], dtype=float).reshape(-1, 3)
+        def moved(points: FloatArray) -> FloatArray:
             triangle, weights, _ = worn.closest(points)
-            there = iter(np.einsum("pk,pka->pa", weights, everywhere[triangles[triangle]]).tolist())
-            return [place if isinstance(place, int) else next(there) for place in places]
+            return np.asarray(np.einsum("pk,pka->pa", weights, there[triangles[triangle]]))
 
-        found: list[dict[str, Any]] = []
-        for number, cut in enumerate(cuts):
-            plane = cut.get("plane")
-            if plane is None:
-                found.append({key: moved(value) if key in ("points", "line") else value for key, value in cut.items()})
-                continue
-            try:
-                paths = plane_curves(
-                    layers,
-                    plane["point"],
-                    plane["normal"],
-                    towards=plane.get("towards"),
-                    nearest=plane.get("nearest", False),
-                )
-            except InputError as error:
-                raise InputError(f"seams_cut[{number}]: {error}") from None
-            for layer, path in paths:
-                places = [path.place(each) for each in range(len(path.points))]
-                line = [
-                    sum(weight * now[layer][vertex] for vertex, weight in place.items()).tolist() for place in places
-                ]
-                found.append({**{k: v for k, v in cut.items() if k == "name"}, "line": line, "closed": path.closed})
-        return found
+        return moved
+
+    def layers_on(self, carried: Carried) -> list[FloatArray]:
+        """Return where the vertices of each layer are on the carried garment, #V by 3 [m]."""
+        tree = cKDTree(self.raw.vertices * self.scale)
+        return [carried.vertices[tree.query(layer.vertices)[1]] for layer in self.surfaces]
 
 
-def _known_pattern(read: GarmentFile, name: str) -> list[SewnPanel]:
+def _known_pattern(raw: RawMesh, scale: float, name: str) -> list[SewnPanel]:
     """Return the panels of a garment whose texture is its sewn pattern; none where it is a picture's, or may be one.
 
     A texture in millimetres or centimetres has been measured. One that fits in another unit may be a normalised one by chance: it must lay
     the cloth nearly as it is worn.
     """
     try:
-        panels = sewn_panels(read.raw, read.scale, name=make_piece_name(name))
+        panels = sewn_panels(raw, scale, name=make_piece_name(name))
     except InputError:
         return []
     if panels[0].unit in ("mm", "cm"):
@@ -378,6 +344,7 @@ def _outward(
 
 
 def _joined(layers: Sequence[tuple[FloatArray, NDArray[np.int64]]]) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Return the vertices and the triangles of layers as those of one mesh."""
     first = np.cumsum([0, *(len(vertices) for vertices, _ in layers)])
     triangles = [corners + start for (_, corners), start in zip(layers, first[:-1].tolist(), strict=True)]
     return np.concatenate([vertices for vertices, _ in layers]), np.concatenate(triangles)
