@@ -1,6 +1,5 @@
 """Garments: bodies and forms, sewing, finishing, seams that are found, draping."""
 
-from .construction.another_body import BESIDE as BESIDE
 from .construction.another_body import Carried as Carried
 from .construction.another_body import FitJob as FitJob
 from .construction.as_cut import garment_as_cut as garment_as_cut
@@ -18,11 +17,9 @@ from .construction.details import FinishingTable as FinishingTable
 from .construction.details import OpeningTable as OpeningTable
 from .construction.details import PocketTable as PocketTable
 from .construction.details import SeamTable as SeamTable
-from .construction.drawn_curves import CURVES_MM as CURVES_MM
 from .construction.ease import SeamWish as SeamWish
 from .construction.ease import cap_wishes as cap_wishes
 from .construction.ease import seam_ratios as seam_ratios
-from .construction.file_seams import FILE_SEAMS as FILE_SEAMS
 from .construction.file_seams import asked_seams as asked_seams
 from .construction.file_seams import file_seams as file_seams
 from .construction.file_seams import like_cut_pieces as like_cut_pieces
@@ -57,9 +54,8 @@ from .draping.drape_pattern import Placement as Placement
 from .draping.drape_pattern import drape_pattern as drape_pattern
 from .draping.drape_pattern import place_drafted as place_drafted
 from .draping.lift import Lift as Lift
-from .draping.lift import moved_lift as moved_lift
+from .draping.lift import lifts_on_scan as lifts_on_scan
 from .draping.lift import read_lifted as read_lifted
-from .draping.moved_pattern import moved_outlines as moved_outlines
 from .draping.options import DrapeOptions as DrapeOptions
 from .draping.picture import write_compared_drapes as write_compared_drapes
 from .draping.picture import write_correction_picture as write_correction_picture
@@ -88,11 +84,9 @@ from .mannequin.halves import is_side as is_side
 from .mannequin.layout import ARM_LEVELS as ARM_LEVELS
 from .mannequin.layout import LEG_LEVELS as LEG_LEVELS
 from .mannequin.layout import RING_LEVELS as RING_LEVELS
-from .mannequin.mannequin import Level as Level
 from .mannequin.mannequin import Mannequin as Mannequin
 from .mannequin.measurements import size_names as size_names
 from .mannequin.measurements import size_tables as size_tables
-from .mannequin.nearest_size import SizeDifference as SizeDifference
 from .mannequin.neckline import Neckline as Neckline
 from .mannequin.output import MANNEQUIN_FILES as MANNEQUIN_FILES
 from .mannequin.output import write_mannequin as write_mannequin
@@ -100,7 +94,6 @@ from .mannequin.part_pieces import part_pieces as part_pieces
 from .mannequin.part_pieces import princess_seams as princess_seams
 from .mannequin.part_pieces import taken_over as taken_over
 from .mannequin.pieces import is_part_of as is_part_of
-from .mannequin.scan_measures import ScanMeasure as ScanMeasure
 from .mannequin.scan_pose import ScanOptions as ScanOptions
 from .mannequin.shapes import shaped_form as shaped_form
 from .mannequin.table import MannequinTable as MannequinTable
@@ -110,7 +103,6 @@ from .seams.by_hand import plane_curves as plane_curves
 from .seams.find import GRAIN as GRAIN
 from .seams.find import FoundSeams as FoundSeams
 from .seams.find import find_seams as find_seams
-from .seams.find import seam_words as seam_words
 from .seams.layers import read_garment as read_garment
 from .seams.layers import read_layers as read_layers
 from .seams.options import NO_PATTERN as NO_PATTERN

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from warpflat.app.cli.options import DONE, ComputingCommand, measure_option, tell
+from warpflat.app.cli.options import DONE, ComputingCommand, measure_option, out_option, tell
 from warpflat.app.cli.run import start_warp_silently
 from warpflat.core import InputError, require_memory_for_usd
 
@@ -34,7 +34,7 @@ __all__ = ["mannequin", "read_lengths"]
 @click.option(
     "--resolution", type=click.FloatRange(2, 40), metavar="MM", help="Wished edge of the quads.  [default: 10]"
 )
-@click.option("--out", "-o", type=click.Path(path_type=Path), metavar="DIR", help="[default: out/mannequin]")
+@out_option("[default: out/mannequin]")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes.")
 @click.option("--json", "as_json", is_flag=True, help="Print metrics.json on standard output, nothing else.")
 def mannequin(
@@ -97,9 +97,9 @@ def mannequin(
     elif not quiet:
         for note in body.notes:
             tell(f"note: {note}")
-        click.echo(mannequin_table(body.source, body.levels(), body.size_difference()))
-        if (over := body.measure_difference()) is not None:
-            click.echo(f"\n{measures_table(body.measures, over)}\n")
+        click.echo(mannequin_table(body))
+        if tapes := measures_table(body):
+            click.echo(f"\n{tapes}\n")
         click.echo(f"{folder}: {', '.join(file.name for file in files.values())}")
     return DONE
 

@@ -23,6 +23,7 @@ __all__ = [
     "ComputingCommand",
     "Output",
     "measure_option",
+    "out_option",
     "output_options",
     "scene_option",
     "scene_options",
@@ -78,6 +79,11 @@ def measure_option() -> Callable[[Command], Command]:
     """Return the option of measurements of the body."""
     words = "A measurement in metres, such as bust=0.88; what can only be centimetres or millimetres is read as such."
     return click.option("--measure", "measures", multiple=True, metavar="NAME=LENGTH", help=words)
+
+
+def out_option(words: str) -> Callable[[Command], Command]:
+    """Return the option of the folder into which a command writes; `words` tell its default."""
+    return click.option("--out", "-o", type=click.Path(path_type=Path), metavar="DIR", help=words)
 
 
 def scene_option(key: str, *, help: str = "") -> Callable[[Command], Command]:
@@ -171,13 +177,7 @@ def output_options(
         verbose: whether there is more to print.
     """
     options: list[Callable[[Command], Command]] = [
-        click.option(
-            "--out",
-            "-o",
-            type=click.Path(path_type=Path),
-            metavar="DIR",
-            help=f"Folder for the files.  [default: {folder}]",
-        ),
+        out_option(f"Folder for the files.  [default: {folder}]"),
         click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes and warnings."),
         click.option(
             "--verbose",

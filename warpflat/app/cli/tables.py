@@ -13,7 +13,7 @@ from warpflat.flat import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_name
 
 if TYPE_CHECKING:
     from warpflat.flat import Ledger
-    from warpflat.garment import Level, ScanMeasure, SizeDifference
+    from warpflat.garment import Mannequin
 
 __all__ = [
     "drape_lines",
@@ -151,14 +151,9 @@ def drape_lines(metrics: Mapping[str, Any]) -> list[str]:
     return [first, *(f"  {place['words']}" for place in drape["places"])]
 
 
-def mannequin_table(source: str, levels: Mapping[str, Level], difference: SizeDifference | None = None) -> str:
-    """Return height and girth of every level as text, from the neck down.
-
-    Args:
-        source: of the body.
-        levels: by name.
-        difference: of a scan to the nearest size.
-    """
+def mannequin_table(body: Mannequin) -> str:
+    """Return height and girth of every level of a body as text, from the neck down; of a scan beside those of the nearest size."""
+    source, levels, difference = body.source, body.levels(), body.size_difference()
     head = ["level", "height", "girth"]
     rows = [[name, f"{100 * level.height:.1f} cm", f"{100 * level.girth:.1f} cm"] for name, level in levels.items()]
     if difference is not None:
@@ -170,20 +165,18 @@ def mannequin_table(source: str, levels: Mapping[str, Level], difference: SizeDi
     return f"{source}\n{aligned(head, rows)}"
 
 
-def measures_table(measures: Mapping[str, ScanMeasure], difference: SizeDifference) -> str:
-    """Return the tapes around a scan as text, from the head down.
-
-    Args:
-        measures: by name.
-        difference: of the measures to the nearest size.
-    """
+def measures_table(body: Mannequin) -> str:
+    """Return the tapes around a scan as text, from the head down, beside those of the nearest size; "" without a scan."""
+    difference = body.measure_difference()
+    if difference is None:
+        return ""
     head = ("tape around the scan", "height", "girth", "height over size", "girth over size", "place")
     rows = [
         (
             name, f"{100 * m.height:.1f} cm", f"{100 * m.girth:.1f} cm", _more(difference.heights, name),
             _more(difference.girths, name), "" if m.guess is None else "guess",
         )
-        for name, m in measures.items()
+        for name, m in body.measures.items()
     ]  # fmt: skip
     return aligned(head, rows)
 

@@ -6,11 +6,21 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from warpflat.core import InputError, quote_value
 
-__all__ = ["COMMAND_LINE", "SCENE_OPTIONS", "SceneOption", "errors_of_options", "scene_tables"]
+__all__ = [
+    "COMMAND_LINE",
+    "SCENE_OPTIONS",
+    "Dialect",
+    "Paper",
+    "PatternFormat",
+    "PrintedUnit",
+    "SceneOption",
+    "errors_of_options",
+    "scene_tables",
+]
 
 #: What messages about a scene that was made from options begin with.
 COMMAND_LINE = "command line"
@@ -19,6 +29,13 @@ _KEY = re.compile(
     r"(?P<key>[a-z_]+(?:\.[a-z_]+|: [a-z_]+(?= = ))*)(?:\[(?P<number>\d+)\](?:\.[a-z_]+)*)?(?P<rest>(?:: | = | ').*)",
     re.DOTALL,
 )
+
+
+#: Formats of pattern files, dialects of the DXF, papers of the PDF, and units of what is printed.
+PatternFormat = Literal["dxf", "svg", "pdf", "json", "garmentcode", "plt"]
+Dialect = Literal["aama", "astm"]
+Paper = Literal["A4", "Letter", "A0", "Projector"]
+PrintedUnit = Literal["mm", "cm", "in"]
 
 
 class SceneOption(NamedTuple):

@@ -31,14 +31,12 @@ from warpflat.flat import (
     RelaxOptions,
     Surface,
     advise,
-    as_fabric,
     cut,
     cut_surfaces,
     flatten,
     flatten_all,
 )
 from warpflat.garment import (
-    CURVES_MM,
     GRAIN,
     Constraint,
     FormGarment,
@@ -60,7 +58,6 @@ from warpflat.garment import (
     name_seams,
     plan_form,
     seam_ratios,
-    seam_words,
     sew_pieces,
     sewn_centres,
     sized_opening,
@@ -250,7 +247,7 @@ class MeshPlan(Plan):
         if garment.sewn is not None or self.panels:
             for name, recorder in recorders.items():
                 recorder.record_result(garment.pieces[name])
-        found = () if self.found is None else (seam_words(self.found), *self.found.notes)
+        found = () if self.found is None else (self.found.describe(), *self.found.notes)
         return replace(
             garment, remarks=(*unsewn, *found, *(note for sequence in self.sequences for note in sequence.notes))
         )
@@ -564,7 +561,7 @@ def plan_garment(
     wishes = scene_wishes(settings.seams)
     with errors_named(f"{scene.where}: seams"):
         seam_ratios(form, wishes)
-        wishes += cap_wishes(form, as_fabric(options["fabric"]), wishes)
+        wishes += cap_wishes(form, options["fabric"], wishes)
     with errors_named(scene.where):
         constraints = scene_constraints(
             settings.constraints,
@@ -582,5 +579,5 @@ def plan_garment(
         wishes=wishes,
         constraints=constraints,
         openings=openings,
-        settings={**options, "curves_mm": CURVES_MM if settings.curves_mm is None else settings.curves_mm},
+        settings=options if settings.curves_mm is None else {**options, "curves_mm": settings.curves_mm},
     )

@@ -24,6 +24,7 @@ from warpflat.core import (
     InputError,
     IntArray,
     factor_symmetric,
+    format_count,
     polyline_length,
     short_repr,
     turned_left,
@@ -38,6 +39,7 @@ from warpflat.garment.draping.moved_pattern import (
     cell_matrix,
     hold_seams,
     largest_share,
+    moved_outlines,
     seam_differences,
     seam_edges,
     with_pattern,
@@ -45,7 +47,7 @@ from warpflat.garment.draping.moved_pattern import (
 from warpflat.garment.draping.relax_drape import relax_drape
 from warpflat.garment.draping.result import Drape
 from warpflat.garment.draping.sewn_cloth import SewnCloth, pieces_of
-from warpflat.pattern import outline_edges
+from warpflat.pattern import Pattern, outline_edges
 
 __all__ = ["Correction", "Round", "correct_pattern", "relieve_pattern"]
 
@@ -126,6 +128,18 @@ class Correction:
     def apply(self, garment: Garment | Flattening) -> Garment | Flattening:
         """Return the garment, or the piece, with the corrected pattern."""
         return with_pattern(garment, self.after.cloth)
+
+    def drawn(self, pattern: Pattern, size: str) -> Pattern:
+        """Return a pattern from outside in the size that was draped, corrected; see :func:`moved_outlines`."""
+        return moved_outlines(pattern, size, self.before.cloth, self.after.cloth)
+
+    def describe(self) -> str:
+        """Return in a sentence what letting a pattern out has come to."""
+        first, last = self.rounds[0].strained, self.rounds[-1].strained
+        return (
+            f"corrected in {format_count(len(self.rounds) - 1, 'round')}: {100 * first:.1f} % of the cloth was stretched beyond its "
+            f"limit, now {100 * last:.1f} % ({self.reason})"
+        )
 
     def measures(self, garment: Garment | Flattening | None = None) -> dict[str, object]:
         """Return the entry `correction` of `metrics.json`; with the edges of the garment whose pattern it is, if it is given."""

@@ -20,10 +20,12 @@ from warpflat.core import (
     unit,
 )
 from warpflat.flat import SUFFIXES, read_mesh_file
+from warpflat.garment.construction.another_body import BESIDE
 from warpflat.garment.construction.as_cut import read_cut_pattern
+from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.pattern import MIRRORED, Pattern, Piece, read_pattern
 
-__all__ = ["Lift", "moved_lift", "read_lift", "read_lifted", "surface_lift", "whole_lifts"]
+__all__ = ["Lift", "lifts_on_scan", "moved_lift", "read_lift", "read_lifted", "surface_lift", "whole_lifts"]
 
 #: The places on a surface (#P by 3 [m]) of points of its pattern (#P by 2 [m]); or what else is linear in its triangles.
 Lift = Callable[[FloatArray], FloatArray]
@@ -92,6 +94,26 @@ def surface_lift(space: FloatArray, flat: FloatArray, triangles: IntArray) -> Li
 def moved_lift(lift: Lift, turn: FloatArray, shift: FloatArray) -> Lift:
     """Return the map to a surface that was moved: its points @ turn (3 by 3) + shift [m]."""
     return lambda points: lift(points) @ turn + shift
+
+
+def lifts_on_scan(body: Mannequin, lifts: Mapping[str, Lift], pattern: Pattern) -> dict[str, Lift] | None:
+    """Return the lifts to designed surfaces [m] that lie on a scan as their files stand, in the axes of its mannequin; None if they do not.
+
+    Args:
+        body: of a scan, in its pose.
+        lifts: by piece.
+        pattern: of the pieces.
+    """
+    assert body.placed is not None
+    assert body.scan is not None
+    turn, shift = body.placed
+    # The surface is in metres, whatever the scan's unit.
+    turn = turn / np.cbrt(np.linalg.det(turn))
+    moved = {name: moved_lift(lift, turn, shift) for name, lift in lifts.items()}
+    pieces = [piece for piece in pattern.pieces[pattern.sample] if piece.name in moved]
+    borders = [moved[piece.name](edge.points) for piece in pieces for edge in piece.edges]
+    far = cKDTree(body.scan[0]).query(np.concatenate(borders))[0]
+    return moved if np.median(far) <= BESIDE else None
 
 
 def _lift(surface: FloatArray, pattern: FloatArray) -> Lift:
