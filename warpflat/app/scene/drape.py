@@ -72,9 +72,7 @@ def write_drape(
         report_activity("correcting the pattern")
         with errors_named(scene.where):
             other = fabric_of_correction(scene)
-            found = correct_pattern(
-                draped, hold=[*table.hold, *draped.threaded], fabric=other, worn_shape=other is not None
-            )
+            found = correct_pattern(draped, hold=table.hold, fabric=other, worn_shape=other is not None)
             drawing = pattern_options(scene.settings.pattern, None, scene.settings.cloth)
         if output.picture:
             with optional_file(folder / "corrected.png", files) as path:

@@ -174,7 +174,7 @@ def correct_pattern(
 
     Args:
         drape: of the pattern as it is.
-        hold: lines that stay where they are, as in :func:`warpflat.drape`.
+        hold: lines that stay where they are, as in :func:`warpflat.drape`, beside those that an elastic holds.
         fabric: another cloth for the corrected pattern; that of the drape if not given.
         worn_shape: whether the shape as it is worn in `drape` is wanted, rather than the designed one.
         rounds: the most.
@@ -186,7 +186,8 @@ def correct_pattern(
         StepError: another cloth falls off.
     """
     _check_rest(drape)
-    bridging, device, held = not worn_shape, drape.body.device, held_vertices(drape.cloth, hold)
+    bridging, device = not worn_shape, drape.body.device
+    held = held_vertices(drape.cloth, [*hold, *drape.threaded])
     shape = drape.positions if worn_shape else drape.cloth.designed
     cloth = replace(drape.cloth, designed=shape, fabric=fabric or drape.cloth.fabric)
     designed = Body(shape, cloth.faces, device=device) if worn_shape else drape.designed
@@ -266,7 +267,7 @@ def relieve_pattern(drape: Drape, *, hold: Sequence[str] = (), rounds: int = 6) 
         InputError: the drape is not at rest.
     """
     _check_rest(drape)
-    held, limit = held_vertices(drape.cloth, hold), drape.cloth.fabric.strain_limit
+    held, limit = held_vertices(drape.cloth, [*hold, *drape.threaded]), drape.cloth.fabric.strain_limit
     seams = seam_edges(drape.cloth)
     difference = seam_differences(drape.cloth.flat, seams)
 
