@@ -19,7 +19,6 @@ from .construction.details import PocketTable as PocketTable
 from .construction.details import SeamTable as SeamTable
 from .construction.ease import SeamWish as SeamWish
 from .construction.ease import cap_wishes as cap_wishes
-from .construction.ease import seam_ratios as seam_ratios
 from .construction.file_seams import asked_seams as asked_seams
 from .construction.file_seams import file_seams as file_seams
 from .construction.file_seams import like_cut_pieces as like_cut_pieces

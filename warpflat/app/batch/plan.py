@@ -41,7 +41,7 @@ class BodyTable(MannequinTable):
     @property
     def label(self) -> str:
         """The name of the body in the index."""
-        return self.name or (self.size_name if self.scan is None else Path(self.scan).stem)
+        return self.name or super().label
 
     def as_mannequin(self) -> dict[str, Any]:
         """Return the `[mannequin]` table of a scene."""
@@ -193,13 +193,8 @@ def _make_task(
         # for paths: a file that is moved leaves the key as it is, a file that changes does not.
         named = _map_paths(settings.model_dump(mode="json"), lambda file: digest(Path(file)))
         text = json.dumps([__version__, scene.name, named], sort_keys=True)
-        if entry.body is not None:
-            label = entry.body.label
-        elif settings.mannequin is None:
-            label = ""
-        else:
-            scan = settings.mannequin.scan
-            label = settings.mannequin.size_name if scan is None else Path(scan).stem
+        body_table = entry.body or settings.mannequin
+        label = "" if body_table is None else body_table.label
         fabric = settings.fabric if isinstance(settings.fabric, str) else "own"
         # Who looks into the folder finds a task by its words; the digits tell apart what they leave out.
         words = "-".join(filter(None, (scene.name, label, fabric)))

@@ -80,8 +80,7 @@ _FILES = """\b
 @scene_options("fabric", "shear_limit")
 @scene_option("bands", help="As for warpflat flatten.")
 @scene_option("name", help="Name of the files.  [default: the garment's]")
-@scene_option("output.frames")
-@click.option("--no-picture", is_flag=True, help="Write no pictures, and no review.html, which shows them.")
+@scene_options("output.frames", "output.picture")
 @output_options(folder="out/NAME-fitted", printed="fit.json")
 def fit(
     garment: Path,
@@ -136,7 +135,6 @@ def fit(
     # The carried mesh is one of its own, with its unit.
     of_file = dict.fromkeys(("units", "prim", "name"))
     tables = scene_tables({**options, **of_file, "cut_seam": tuple(cuts)})
-    tables["output"] = {"picture": not options["no_picture"], **tables.get("output", {})}
     check_tables(tables, garment, drawn)
     refuse_to_replace_others(folder, STUDY_FILES)
     start_warp_silently()

@@ -13,7 +13,7 @@ from warpflat.app.cli.options import DONE, ComputingCommand, measure_option, out
 from warpflat.app.cli.run import start_warp_silently
 from warpflat.core import InputError, require_memory_for_usd
 
-__all__ = ["mannequin", "read_lengths"]
+__all__ = ["mannequin", "read_lengths", "sized_body"]
 
 
 @click.command(cls=ComputingCommand)
@@ -77,10 +77,7 @@ def mannequin(
         tables["pose"] = "scan"
     if tables.pop("keep_sides", False):
         tables["symmetric"] = False
-    if size is not None:
-        tables["size"] = size
-    if measures:
-        tables["measurements"] = read_lengths(measures, "--measure")
+    tables |= sized_body(size, measures)
     if landmarks:
         tables["landmarks"] = read_lengths(landmarks, "--landmark")
     if resolution is not None:
@@ -102,6 +99,12 @@ def mannequin(
             click.echo(f"\n{tapes}\n")
         click.echo(f"{folder}: {', '.join(file.name for file in files.values())}")
     return DONE
+
+
+def sized_body(size: str | None, measures: Sequence[str]) -> dict[str, Any]:
+    """Return the table of the body that --size and --measure give; empty without them."""
+    lengths = {"measurements": read_lengths(measures, "--measure")} if measures else {}
+    return lengths if size is None else {"size": size, **lengths}
 
 
 def read_lengths(texts: Sequence[str], option: str) -> dict[str, float]:

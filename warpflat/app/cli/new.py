@@ -139,13 +139,9 @@ def _draw_card(card: Path, garment: str, tables: Mapping[str, Any], body: Mappin
 
 def _body_table(size: str | None, measures: tuple[str, ...], scan: Path | None, file: Path) -> dict[str, Any]:
     """Return the table of the body, as a scene in a file has it."""
-    from warpflat.app.cli.mannequin import read_lengths
+    from warpflat.app.cli.mannequin import sized_body
 
-    table: dict[str, Any] = {}
-    if size is not None:
-        table["size"] = size
-    if measures:
-        table["measurements"] = read_lengths(measures, "--measure")
+    table = sized_body(size, measures)
     if scan is not None:
         # Scenes start from their own folder.
         table["scan"] = Path(os.path.relpath(scan, file.parent)).as_posix()

@@ -89,6 +89,8 @@ def out_option(words: str) -> Callable[[Command], Command]:
 def scene_option(key: str, *, help: str = "") -> Callable[[Command], Command]:
     """Add the option of a command that sets a key of a scene; `help` replaces what it says of itself."""
     option = SCENE_OPTIONS[key]
+    if option.kind is bool:
+        return click.option(option.name, flag_value=False, default=None, help=help or option.help)
     return click.option(
         option.name,
         type=option.kind if isinstance(option.kind, type) else click.Choice(option.kind),

@@ -15,6 +15,7 @@ from warpflat.pattern import pattern_names
 
 if TYPE_CHECKING:
     from warpflat.garment import Drape
+    from warpflat.pattern import PatternOptions
 
 __all__ = ["drape_names", "drape_scene", "write_drape"]
 
@@ -39,7 +40,7 @@ def _corrected_formats(scene: Scene) -> list[str]:
 
 
 def write_drape(
-    scene: Scene, garment: Garment, folder: Path, *, device: str | None = None
+    scene: Scene, garment: Garment, folder: Path, *, drawing: PatternOptions, device: str | None = None
 ) -> tuple[dict[str, Any], list[str], tuple[str, ...]]:
     """Drape a scene's garment, and write its files.
 
@@ -47,6 +48,7 @@ def write_drape(
         scene: with a `[drape]` table.
         garment: flattened.
         folder: an existing one.
+        drawing: options of the pattern files.
         device: Warp device.
 
     Returns:
@@ -65,7 +67,6 @@ def write_drape(
     metrics, notes = {"drape": draped.measures()}, tuple[str, ...]()
     if table.correct or table.correct_fabric is not None:
         # Correct the pattern, and write it beside the first.
-        from warpflat.app.scene.pattern_options import pattern_options
         from warpflat.core import optional_file
         from warpflat.garment import correct_pattern
 
@@ -73,7 +74,6 @@ def write_drape(
         with errors_named(scene.where):
             other = fabric_of_correction(scene)
             found = correct_pattern(draped, hold=table.hold, fabric=other, worn_shape=other is not None)
-            drawing = pattern_options(scene.settings.pattern, None, scene.settings.cloth)
         if output.picture:
             with optional_file(folder / "corrected.png", files) as path:
                 from warpflat.garment import write_correction_picture
@@ -81,7 +81,7 @@ def write_drape(
                 write_correction_picture(path, found)
         corrected = found.apply(garment)
         assert isinstance(corrected, Garment)
-        drawing = replace(drawing, formats=_corrected_formats(scene))
+        drawing = replace(drawing, formats=_corrected_formats(scene), cloth=None)
         written = garment_files({"": corrected}, folder, name=f"{scene.name}.corrected", options=drawing)
         metrics["drape"]["correction"] = found.measures(garment)
         files += written.files

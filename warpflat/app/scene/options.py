@@ -44,7 +44,7 @@ class SceneOption(NamedTuple):
     Attributes:
         declaration: its name with its dashes, and what its value is called where `kind` does not list the values.
         help: what it does.
-        kind: of its value: text, a number, or one of several words.
+        kind: of its value: text, a number, one of several words, or `bool` of a switch, which sets the key to false.
         multiple: whether it may be given several times.
     """
 
@@ -154,6 +154,7 @@ SCENE_OPTIONS: Mapping[str, SceneOption] = {
         "A piece that would lie over itself is parted where its border is nearer than this; 0: not.  [default: 0.5]", float,
     ),
     "output.frames": SceneOption("--frames N", "About how many frames, 0 for none.  [default: 60]", int),
+    "output.picture": SceneOption("--no-picture", "Write no pictures, and no review.html, which shows them.", bool),
     "device": SceneOption("--device NAME", "Warp device, such as cpu or cuda:0.  [default: Warp's choice]"),
 }  # fmt: skip
 

@@ -57,7 +57,6 @@ from warpflat.garment import (
     garment_as_cut,
     name_seams,
     plan_form,
-    seam_ratios,
     sew_pieces,
     sewn_centres,
     sized_opening,
@@ -560,7 +559,6 @@ def plan_garment(
         check_fold_grain(find_fold_lines(form, plan), settings.grain_angle)
     wishes = scene_wishes(settings.seams)
     with errors_named(f"{scene.where}: seams"):
-        seam_ratios(form, wishes)
         wishes += cap_wishes(form, options["fabric"], wishes)
     with errors_named(scene.where):
         constraints = scene_constraints(

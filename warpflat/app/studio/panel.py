@@ -206,7 +206,7 @@ def _head(session: Session) -> str:
     solution, scene = session.shown, session.scene
     words = [f"<b>{escape(scene.name)}</b>"]
     if scene.settings.mannequin is not None:
-        words.append(escape(scene.settings.mannequin.size_name or "scan"))
+        words.append(escape(scene.settings.mannequin.size_name))
     rows = ""
     if solution is not None:
         state = "at rest" if solution.at_rest else "<b style='color:#b00020'>not at rest</b>"
