@@ -153,4 +153,6 @@ def _shares(part: Sequence[float]) -> list[float]:
 
 def _unused(scene: Scene, name: str, piece: str | None = None) -> str:
     """Return a name that no cut of the scene, or of the piece, has yet."""
-    return find_unused_name(name, {table.name or table.line for table in scene.settings.cuts if table.piece == piece})
+    return find_unused_name(
+        name, {table.name or str(table.line) for table in scene.settings.cuts if table.piece == piece}
+    )

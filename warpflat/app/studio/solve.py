@@ -111,17 +111,17 @@ def solve(
         told = garment.pieces[scene.name].messages
         return Solution(scene=scene, garment=garment, bare=bare, notes=(*sequence.notes, *told))
     settled, notes = settle_shape(scene)
-    known = None if before is None else before.plan
-    same_body = known is not None and _alike(scene, known.scene, _OF_BODY)
-    mannequin = known.mannequin if known is not None and same_body else scene_mannequin(scene)
+    last = None if before is None else before.plan
+    same_body = last is not None and _alike(scene, last.scene, _OF_BODY)
+    mannequin = last.mannequin if last is not None and same_body else scene_mannequin(scene)
 
     def made(one: Scene) -> tuple[GarmentPlan, FormGarment]:
-        nonlocal known
-        if known is not None and same_body and _alike(one, known.scene, _OF_FORM):
-            form = known.form
+        nonlocal last
+        if last is not None and same_body and _alike(one, last.scene, _OF_FORM):
+            form = last.form
         else:
-            form = scene_form(one, mannequin, before=None if known is None else known.form)[1]
-        plan = known = plan_garment(one, built=(mannequin, form))
+            form = scene_form(one, mannequin, before=None if last is None else last.form)[1]
+        plan = last = plan_garment(one, built=(mannequin, form))
         garment = plan.flatten(callback=callback, known=_known(plan, before))
         require_open_darts(one, [garment])
         return plan, garment

@@ -15,7 +15,6 @@ from scipy.spatial import cKDTree
 from warpflat.core import (
     FloatArray,
     InputError,
-    IntArray,
     make_file_name,
     make_piece_name,
     nearest,
@@ -68,7 +67,7 @@ class Carried:
     notes: tuple[str, ...] = ()
 
     @property
-    def skin_faces(self) -> IntArray:
+    def skin_faces(self) -> NDArray[np.int64]:
         """The triangles of the skin, #T by 3."""
         return finer_body()[1]
 
