@@ -89,19 +89,11 @@ def check_tables(tables: Mapping[str, Any], garment: Path, drawn: Sequence[str] 
         scene_fabric(make_scene(given, name="garment", folder=Path(), where=COMMAND_LINE))
 
 
-def read_job(
-    path: Path,
-    *,
-    units: str | None = None,
-    prim: str | None = None,
-    name: str | None = None,
-    front: str | None = None,
-    body: str | None = None,
-) -> FitJob:
+def read_job(path: Path, *, front: str | None = None, body: str | None = None, **of_file: str | None) -> FitJob:
     """Read a garment, and its body, or fit one inside it.
 
     Args:
-        path, units, prim, name: as :func:`warpflat.garment.seams.layers.read_garment` takes them.
+        path, of_file: the file, with `units`, `prim` and `name` as :func:`warpflat.garment.seams.layers.read_garment` takes them.
         front, body: as :meth:`warpflat.garment.construction.another_body.FitJob.start` takes them.
 
     Raises:
@@ -111,7 +103,7 @@ def read_job(
 
     sources: list[Path] = []
     with listening_to_reads(sources.append):
-        read = read_garment(path, units=units, prim=prim, name=name)
+        read, name = read_garment(path, **of_file), of_file.get("name")
         job = FitJob.start(path, read.layers, read.raw, read.scale, name=name, front=front, body=body)
     return replace(job, sources=tuple(sources))
 
