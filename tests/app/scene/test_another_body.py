@@ -84,9 +84,9 @@ def test_a_skirt_is_fitted_to_another_size(command: Command):
     assert np.array_equal(before.raw.polygons, after.raw.polygons)
     files = metrics["files"]["skirt"]
     assert {"skirt.fitted.obj", "skirt.body.obj", "pattern.json"} <= set(files)
-    # A second time it replaces what it has written.
-    again = command("fit", "skirt.obj", "--units", "m", "--from", "EU 36", "--to", "EU 42", "--out", "fitted", *BARE)
-    assert (again.code, again.err) == (0, "")
+    # A second time it would replace what it has written.
+    assert {"metrics.json", *STUDY_FILES[:1], *files} == {path.name for path in Path("fitted").iterdir()}
+    refuse_to_replace_others(Path("fitted"), ["metrics.json", *STUDY_FILES, *files])
 
 
 def test_a_known_pattern_is_graded_and_keeps_its_grain(tmp_path: Path):
