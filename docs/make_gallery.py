@@ -51,7 +51,7 @@ def gallery_page() -> str:
     thumbnails, folded = [], []
     for path in scene_files():
         paragraphs, commands = read_comment(path)
-        # tests/scenes runs every scene, and tests/app/cli/test_docs.py what is not marked.
+        # tests/app/scene runs every scene, and tests/app/cli/test_docs.py what is not marked.
         fence = "<!-- only parsed -->\n```sh\n" + "\n".join(commands) + "\n```"
         picture = []
         if (DOCS / "gallery" / f"{path.stem}.webp").exists():

@@ -45,7 +45,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-SCENES = Path(__file__).parents[2] / "scenes"
+SCENES = Path(__file__).parents[3] / "scenes"
 DATA = os.environ.get("WARPFLAT_DATA")
 
 # Batch files name scenes; tests/app/batch loads them.
