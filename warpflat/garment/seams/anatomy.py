@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
 
 from warpflat.core import AXES, FloatArray, points_at_lengths, polyline_length, reflected, unit
 from warpflat.flat import components
@@ -144,7 +145,7 @@ class Anatomy:
 
     Attributes:
         kind: of garment.
-        up, front, left: directions in space.
+        up, front: directions in space.
         normal, offset: the plane of symmetry, normal . x = offset; the normal points to the left.
         asymmetry: median distance of the mirrored cloth from the cloth [m].
         symmetric: whether it is its own mirror image in that plane.
@@ -159,7 +160,6 @@ class Anatomy:
     kind: Kind
     up: FloatArray
     front: FloatArray
-    left: FloatArray
     normal: FloatArray
     offset: float
     asymmetry: float
@@ -310,7 +310,7 @@ def _worn(cloth: Cloth, raw: Sequence[Border], upward: FloatArray, front: str | 
         turned_words = _faces_backwards(cloth, borders, kind, upward, forward, open_front)
         if turned_words:
             notes.append(turned_words)
-            forward, left, normal, offset = -forward, -left, -normal, -offset
+            forward, normal, offset = -forward, -normal, -offset
             borders = [replace(border, side=-border.side) for border in borders]
             limbs = [replace(limb, side=-limb.side) for limb in limbs]
     if one_sleeve:
@@ -323,7 +323,6 @@ def _worn(cloth: Cloth, raw: Sequence[Border], upward: FloatArray, front: str | 
         kind=kind,
         up=upward,
         front=forward,
-        left=left,
         normal=normal,
         offset=offset,
         asymmetry=asymmetry,
@@ -397,8 +396,6 @@ def _plane_of_symmetry(
 
     Closest points again and again, from twelve upright planes through the middle.
     """
-    from scipy.spatial import cKDTree
-
     tree = cKDTree(vertices)
     share = mass / mass.sum()
     # Quadrature points of equal area, and so independent of how fine the mesh is where.

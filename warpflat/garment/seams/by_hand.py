@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 
 from warpflat.core import FloatArray, InputError, arc_lengths, points_at_lengths, project_on_segments, quote_value, unit
 from warpflat.flat import Surface, SurfacePath, are_joined, geodesic_path, locate, plane_sections, polyline_path
@@ -192,8 +193,6 @@ def _owners(surfaces: Sequence[Surface], rows: Sequence[Ids]) -> tuple[list[int]
     Raises:
         InputError: there is no such vertex, or it lies on none of the layers.
     """
-    from scipy.spatial import cKDTree
-
     wanted, of_row = np.unique(np.concatenate(rows), return_inverse=True)
     count = max(len(surface.input_vertices) for surface in surfaces)
     if wanted[-1] >= count:
@@ -277,8 +276,6 @@ def join_ends(cloth: Cloth) -> tuple[Cloth, list[str]]:
 
 def leave_to_hand(cloth: Cloth, options: SeamOptions) -> tuple[Cloth, list[str]]:
     """Return the cloth without seams that were found where the user has drawn one, and notes: of the same name, or close beside it."""
-    from scipy.spatial import cKDTree
-
     drawn = {name: edges for name, edges in cloth.seams.items() if name.startswith(HAND)}
     if not drawn:
         return cloth, []

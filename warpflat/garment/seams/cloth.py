@@ -110,6 +110,10 @@ class Cloth(TriangleMesh):
         every = {**self.labels, **labels}
         return replace(self, labels={name: label for name, label in every.items() if label is not None})
 
+    def marked(self, faces: Ids) -> BoolArray:
+        """Return #F, whether a face is among those of some numbers."""
+        return np.isin(np.arange(len(self.faces)), faces)
+
     def only(self, faces: BoolArray) -> Cloth:
         """Return some of the faces (#F) alone, with the vertices that they use, and what of the seams runs along them."""
         used, place = np.unique(self.faces[faces], return_inverse=True)

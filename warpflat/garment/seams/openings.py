@@ -52,8 +52,7 @@ def _opened(cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy, options: SeamOption
     before, used = _tubes(mesh), np.unique(mesh.vertex_of)
     limbs = [limb for limb in anatomy.limbs if np.isin(anatomy.borders[limb.border].vertices, used).all()]
     for name, level, cost in _lines(cloth, anatomy, [limb.kind for limb in limbs]):
-        own = np.isin(np.arange(len(cloth.faces)), mesh.face_of)
-        made, _, own, lines = cloth.parted(level, own)
+        made, _, own, lines = cloth.parted(level, cloth.marked(mesh.face_of))
         parts = edge_components(made.new_edges(lines), ends=np.union1d(made.border_edges, made.seam_edges()))
         chosen = [(cost(made, part), part) for part in parts]
         for value, part in sorted(chosen, key=lambda one: one[0]):
