@@ -76,8 +76,8 @@ _HEADS, _HANDS, _FLAT_HAND = (0.38, 0.75), (0.1, 0.45), 0.65
 _ENOUGH_ABOVE = 0.2
 #: A border is a ring if its area vector is at least this of a circle's; an opening in front is none.
 RING = 0.6
-# Cloth that goes on from all its
-# hems as a tube widened by more than this is a ball's with holes (a top's hem or sleeve .9 to 1.12, a ball's from 1.2 on).
+# Cloth that goes on from all its hems as a tube widened by more than this is a ball's with holes (a top's hem or sleeve .9 to 1.12, a
+# ball's from 1.2 on).
 _TUBE = 1.16
 # It is turned around if it can be worn better by this.
 _SURELY = 0.25
@@ -85,6 +85,8 @@ _SURELY = 0.25
 END = 0.15
 # A plane of symmetry holds if the mirror image of the cloth lies on the cloth within this (median).
 _SYMMETRIC = 0.02
+# Rounds of closest points for the plane of symmetry that is taken.
+_MORE_ROUNDS = 40
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -191,6 +193,11 @@ class Anatomy:
         """Return the longest border of a role, if there is one."""
         return next((border for border in self.borders if border.role == role), None)
 
+    @property
+    def neck(self) -> Border | None:
+        """The border around the neck: of what is open in front the opening; None for what hangs from the waist."""
+        return self.border("neck") or self.border("opening")
+
 
 def find_anatomy(cloth: Cloth, *, up: str | None = None, front: str | None = None) -> Anatomy:
     """Find out what a garment is.
@@ -241,7 +248,7 @@ def _wearable(cloth: Cloth, anatomy: Anatomy) -> float:
     if anatomy.kind == "trousers":
         return 0.0
     if anatomy.kind == "jumpsuit":
-        neck = anatomy.border("neck") or anatomy.border("opening")
+        neck = anatomy.neck
         return 2.0 * float(heights[neck.vertices].max() - low) / tall - 1.0 if neck is not None else -1.0
     above, below = end("waist" if anatomy.kind == "skirt" else "neck", True), end("hem", False)
     if not above or not below:
@@ -383,10 +390,6 @@ def _above_slanted_hem(cloth: Cloth, upward: FloatArray, loops: Sequence[Border]
     above = cloth.mass * (heights > hem.max())
     slants = np.ptp(hem) > END * np.ptp(heights) and above.sum() > _ENOUGH_ABOVE * cloth.mass.sum()
     return above if slants else cloth.mass
-
-
-# Rounds of closest points for the plane of symmetry that is taken.
-_MORE_ROUNDS = 40
 
 
 def _plane_of_symmetry(

@@ -333,11 +333,11 @@ def _can_be_sewn(cloth: Cloth, line: Line, before: Sequence[Measured], after: Se
         return least_width(after, size) >= least_width(before, size)
     # A flap that hangs by what is hardly sewn counts while it is small, too.
     for necks in ((NARROW * size,), (SEWABLE, 0.005)):
-        parts = (
+        was, now = (
             max(parts_within(one.surface.faces, one.result.positions, *necks) for one in some)
             for some in (before, after)
         )
-        if next(parts) < next(parts):
+        if now > was:
             return False
     beside = np.unique(cloth.seams[_TRIAL])
     widest = 0.0

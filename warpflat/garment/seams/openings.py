@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,17 +78,14 @@ def _lines(cloth: Cloth, anatomy: Anatomy, limbs: list[str]) -> Iterator[tuple[s
     def beside(cloth: Cloth, edges: Ids) -> float:
         return float(np.abs(anatomy.across(cloth.vertices[np.unique(edges)])).mean())
 
-    def behind(cloth: Cloth, edges: Ids) -> float:
-        facing = float(cloth.values[FACING][np.unique(edges)].mean())
+    def behind(cloth: Cloth, edges: Ids, sign: float = 1.0) -> float:
+        facing = sign * float(cloth.values[FACING][np.unique(edges)].mean())
         return facing if facing < 0.0 else np.inf
-
-    def ahead(cloth: Cloth, edges: Ids) -> float:
-        return behind(cloth.with_values(**{FACING: -cloth.values[FACING]}), edges)
 
     if limbs == ["sleeve"]:
         yield "underarm", FACING, height
     if "leg" in limbs:
         yield "inseam", FACING, beside
     yield "centre back", LEFT, behind
-    yield "centre front", LEFT, ahead
+    yield "centre front", LEFT, partial(behind, sign=-1.0)
     yield "side", FACING, lambda cloth, edges: -beside(cloth, edges)

@@ -26,7 +26,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 
 from warpflat.core import FloatArray, IntArray, polyline_length, unit
-from warpflat.flat import Surface, border_loops, euler_characteristic, inner_borders, triangulate
+from warpflat.flat import Surface, border_loops, inner_borders, triangulate
 from warpflat.garment.seams.anatomy import HOLE, Anatomy
 from warpflat.garment.seams.cloth import ALIKE, SAME_WAY, Cloth, PieceMesh, section
 from warpflat.garment.seams.fields import TriangleMesh
@@ -141,7 +141,7 @@ def is_whole_garment(surface: Surface) -> bool:
         return False
     cloth = Cloth(vertices=surface.vertices, faces=triangulate(surface.faces)[0].astype(np.int64))
     wide = _wide_borders(cloth)
-    handles = (2 - len(border_loops(surface.faces, surface.vertices)) - euler_characteristic(surface.faces)) // 2
+    handles = (2 - sum(cloth.shape)) // 2
     if len(wide) == 2:
         # Between a flat ring and a tube, which is cut open, lies what neither is nor becomes flat, such as a poncho.
         lack = 1.0 + inner_borders(surface)[0][1] / (2.0 * np.pi)
