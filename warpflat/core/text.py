@@ -10,6 +10,7 @@ __all__ = [
     "MADE_TO_MEASURE",
     "aligned",
     "control_in",
+    "dart_words",
     "find_unused_name",
     "format_count",
     "line_name",
@@ -55,6 +56,11 @@ def without_side(name: str) -> str:
     """Return a name without its side, left or right: the shoulder of "shoulder left"; underscores become spaces."""
     words = name.replace("_", " ").split(" ")
     return " ".join(word for word in words if word not in ("left", "right")) or name
+
+
+def dart_words(name: str) -> str:
+    """Return what a dart is called: "waist dart left", "dart bust"; the word is said once."""
+    return name if "dart" in without_side(name).split(" ") else f"dart {name}"
 
 
 def line_name(name: str) -> str:
@@ -141,12 +147,12 @@ def plain_letters(text: str) -> str:
     return "".join(letter for letter in apart if not unicodedata.combining(letter))
 
 
-def find_unused_name(name: str, taken: Container[str]) -> str:
-    """Return the name itself if it is not in `taken`, else "name 2" or the first number after that which is free."""
+def find_unused_name(name: str, taken: Container[str], *, joint: str = " ") -> str:
+    """Return the name itself if it is not in `taken`, else "name 2" or the first number after that which is free, joined so."""
     number = 2
-    while f"{name} {number}" in taken:
+    while f"{name}{joint}{number}" in taken:
         number += 1
-    return f"{name} {number}" if name in taken else name
+    return f"{name}{joint}{number}" if name in taken else name
 
 
 def name_without_number(name: str, names: Container[str]) -> str:

@@ -128,11 +128,16 @@ def draw_sheet(printed: DraftedGarment, paper: str) -> tuple[Tiling, list[tuple[
                 pieces = _beside_on_one_sheet(place, others, tiling)
         placed.append(replace(place, pieces=tuple(_upright(piece, place.matrix) for piece in pieces)))
     tiling, letters = replace(tiling, sheet=replace(sheet, placed=tuple(placed))), seam_letters(printed)
+    sewn: dict[tuple[str, str], list[str]] = {}
+    for seam in printed.garment.seams:
+        for side in seam.stretches:
+            sewn.setdefault(side.place, []).append(seam.name)
     drawings = []
     for place in placed:
         joints = [place.on_piece(joint) for joint in tiling.joints]
         outside = shapely.transform(tiling.outside, place.on_piece)
-        drawings.append(draw_nest(place.pieces, OnPaper(joints=joints, outside=outside, letters=letters)))
+        shown = OnPaper(joints=joints, outside=outside, letters=letters, sewn=sewn)
+        drawings.append(draw_nest(place.pieces, shown))
     return tiling, drawings
 
 
@@ -165,13 +170,21 @@ def _beside_on_one_sheet(place: Placed, others: Sequence[Placed], tiling: Tiling
 
 
 def too_many_sheets(garment: DraftedGarment, paper: str) -> str:
-    """Return why nobody would print a pattern on sheets of this paper, "" where one would: cloth of a wrong unit takes thousands."""
+    """Return why nobody would print a pattern on sheets of this paper, "" where one would: cloth of a wrong unit takes thousands.
+
+    The garment may have its whole pieces: of those that are printed as halves on the fold half counts.
+    """
     if paper not in PAPERS or not PAPERS[paper].tiled:
         return ""
     import shapely
 
-    area = sum(shapely.Polygon(piece.cut_line).area for row in garment.pieces.values() for piece in row)
-    sheets = area / float(np.prod(PAPERS[paper].step))
+    step = float(np.prod(PAPERS[paper].step))
+
+    def sheets_of(drafted: DraftedGarment) -> float:
+        return sum(shapely.Polygon(piece.cut_line).area for row in drafted.pieces.values() for piece in row) / step
+
+    sheets = sheets_of(garment)
+    sheets = sheets_of(halved(garment)) if sheets > MOST_SHEETS else sheets
     return f"it would take some {sheets:,.0f} sheets; check the units, or take A0 paper" if sheets > MOST_SHEETS else ""
 
 
@@ -329,13 +342,7 @@ def sheet_names(tiling: Tiling, drawings: Sequence[tuple[Drawing, ...]]) -> dict
     lines, words = [], []
     for placed, sizes in zip(tiling.sheet.placed, drawings, strict=True):
         for drawing in sizes:
-            lines += [
-                shapely.LineString(
-                    placed.on_sheet(np.vstack([each.points, each.points[:1]] if each.closed else [each.points]))
-                )
-                for each in drawing.strokes
-                if not each.hidden
-            ]
+            lines += [shapely.LineString(placed.on_sheet(each.path)) for each in drawing.strokes if not each.hidden]
             words += [shapely.Polygon(placed.on_sheet(each.box())) for each in drawing.words]
     taken = shapely.STRtree([*lines, *words])
     height, found = SHEET_NAME * CAPITALS / POINT, {}
