@@ -348,7 +348,9 @@ def curved_dart(mouth, bends=(0.08, 0.08), length=0.1):
 def test_a_dart_without_room_for_its_allowances_is_folded_along_its_middle(mouth, bends):
     piece = curved_dart(mouth, bends)
     (dart,) = piece.darts
-    assert any(f"is folded, not cut away: its mouth of {length_words(mouth)} has" in note for note in piece.notes)
+    assert any(
+        f"dart d is folded, not cut away: its mouth of {length_words(mouth)} has" in note for note in piece.notes
+    )
     assert {(n.edge, n.seam) for n in piece.notches} == {("l", "d"), ("r", "d")}
     wedge = shapely.Polygon(np.concatenate([piece.edge("l").line, piece.edge("r").line[1:]]))
     cut = shapely.Polygon(piece.cut_line)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, points_at_lengths, unit
+from warpflat.core import FloatArray, InputError, dart_words, points_at_lengths, unit
 from warpflat.pattern.drafting.hem_allowance import HEM_SLANT
 from warpflat.pattern.drafting.polygons import (
     GRID,
@@ -69,7 +69,7 @@ def dart_allowance(
     if not whole:
         cap, _ = _half_cap(wedge, body, covered, mouth, beyond, leg + spare)
         notes.append(
-            f"dart {wedge.name} meets the border at so low an angle that its wedge is not caught in the seam: "
+            f"{dart_words(wedge.name)} meets the border at so low an angle that its wedge is not caught in the seam: "
             "turn the dart, or open it less"
         )
     return (on_left, on_right), [end_left, end_right, *lobes, cap, reflect(cap, wedge.tip, wedge.middle)], notes
