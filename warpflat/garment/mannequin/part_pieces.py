@@ -11,7 +11,7 @@ from warpflat.core import FloatArray, InputError, IntArray, nearest, other_side
 from warpflat.flat import join_labels
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.darts import FormDart, place_darts
-from warpflat.garment.mannequin.forms import Form, PieceRecipe
+from warpflat.garment.mannequin.forms import Form, FormResult, PieceRecipe
 from warpflat.garment.mannequin.halves import is_side
 from warpflat.garment.mannequin.layout import Layout
 
@@ -78,19 +78,13 @@ def taken_over(layout: Layout, vertices: FloatArray, form: Form, seams: Sequence
     return gone
 
 
-def princess_seams(layout: Layout, bricks: Sequence[str], piece: str) -> list[FormDart]:
-    """Return the cuts along whole princess lines that part a piece on both sides of the body.
-
-    Args:
-        layout: the grid.
-        bricks: of the piece, both sides of the body.
-        piece: its name.
-    """
+def princess_seams(form: FormResult, piece: str) -> list[FormDart]:
+    """Return the cuts along whole princess lines that part a piece of a form on both sides of the body."""
     lines = [f"princess {face} left" for face in ("front", "back")]
     return [
         FormDart(name="princess seam", piece=piece, line=line, part=(0.0, 1.0))
         for line in lines
-        if len(set(_labels(layout, bricks, [line, other_side(line)]).tolist())) > 1
+        if len(set(_labels(form.layout, form.bricks[piece], [line, other_side(line)]).tolist())) > 1
     ]
 
 

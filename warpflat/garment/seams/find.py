@@ -24,9 +24,9 @@ from warpflat.flat import (
     Fabric,
     Flattening,
     Surface,
-    area_vectors,
     as_fabric,
     border_loops,
+    flat_areas,
     line_from_curve,
     line_on_plane,
     load_library,
@@ -56,7 +56,7 @@ from warpflat.garment.seams.tailor import FACING, cut_as_a_tailor, draw_fields, 
 from warpflat.garment.seams.thickness import without_thickness
 from warpflat.pattern import FoundSeam
 
-__all__ = ["GRAIN", "FoundSeams", "find_seams", "seam_words"]
+__all__ = ["GRAIN", "FoundSeams", "find_seams"]
 
 Ids = NDArray[np.int64]
 
@@ -106,8 +106,7 @@ class FoundSeams:
 
     def beyond_limit(self, fabric: Fabric) -> float:
         """Return the share of the cloth that is beyond its limit where the pieces are laid flat, about."""
-        vectors = [area_vectors(piece.vertices, triangulate(piece.faces)[0]) for piece in self.pieces]
-        area = [float(np.linalg.norm(each, axis=1).sum()) for each in vectors]
+        area = [float(flat_areas(piece.vertices, piece.faces[:, :3]).sum()) for piece in self.pieces]
         return float(np.average([laid_flat(piece, fabric, 0.0).outside for piece in self.pieces], weights=area))
 
     def knit_for(self, fabric: Fabric) -> str:
@@ -117,6 +116,12 @@ class FoundSeams:
             if self.beyond_limit(knit) <= NO_PATTERN:
                 return knit.name
         return ""
+
+    def describe(self) -> str:
+        """Return what was found in one line."""
+        total = 100 * sum(seam.length for seam in self.seams)
+        along = f", along {self.along}" if self.along else ""
+        return f"{self.what}: {format_count(len(self.pieces), 'piece')}, {format_count(len(self.seams), 'seam')} of {total:.0f} cm{along}"
 
     def entry(self, pieces: Sequence[Flattening], allowance: float) -> dict[str, Any]:
         """Return the entry `garment` of `metrics.json`: what it is, its seams, and whether this is a pattern yet.
@@ -421,14 +426,13 @@ def _surface_of(cloth: Cloth, anatomy: Anatomy, mesh: PieceMesh, whole: Surface,
 def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[str]:
     """Return names of pieces: "left_sleeve", "front", "right_back_leg"; a number behind those that occur twice."""
     area = cloth.face_areas
-    plain, bands = [], [_band(cloth, mesh) for mesh in meshes]
+    plain, bands = list[str](), [_band(cloth, mesh) for mesh in meshes]
     sleeves = [cloth.sleeve_of(mesh) for mesh in meshes]
     # A short sleeve from the armhole on is no cuff.
     bands = [
         "" if band == "cuff" and sleeves.count(sleeve) == 1 and sleeve >= 0 else band
         for band, sleeve in zip(bands, sleeves, strict=True)
     ]
-    both_sides = Counter[str]()
     for mesh, band, sleeve in zip(meshes, bands, sleeves, strict=True):
         weight = area[mesh.face_of]
         corners = cloth.faces[mesh.face_of]
@@ -461,12 +465,11 @@ def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[
             part = side_word(side) if lopsided else "front" if ahead > 0.0 else "back"
             name = f"{part}_{band}" if bands.count(band) > 1 else band
         plain.append(name)
-        both_sides[name] += 1
-    seen = Counter[str]()
+    often, seen = Counter(plain), Counter[str]()
     names = []
     for name in plain:
         seen[name] += 1
-        names.append(f"{name}_{seen[name]}" if both_sides[name] > 1 else name)
+        names.append(f"{name}_{seen[name]}" if often[name] > 1 else name)
     return names
 
 
@@ -492,7 +495,7 @@ def _alike(pieces: Sequence[Surface]) -> list[str]:
     measures = []
     for piece in pieces:
         length = sum(polyline_length(piece.vertices[loop], closed=True) for loop in border_loops(piece.faces))
-        area = np.linalg.norm(area_vectors(piece.vertices, piece.faces[:, :3]), axis=1).sum()
+        area = flat_areas(piece.vertices, piece.faces[:, :3]).sum()
         axes = np.linalg.eigh(np.cov((piece.vertices - piece.vertices.mean(axis=0)).T))[1]
         measures.append([np.sqrt(area), length, *np.ptp(piece.vertices @ axes, axis=0)])
     left = list(range(len(pieces)))
@@ -585,10 +588,3 @@ def _grain(piece: Surface, cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy) -> N
     if len(np.unique(line)) < len(line) or reach < 0.3 * float(np.ptp(piece.vertices @ along)):
         return None
     return np.asarray(line, dtype=np.int32)
-
-
-def seam_words(found: FoundSeams) -> str:
-    """Return what was found in one line."""
-    total = 100 * sum(seam.length for seam in found.seams)
-    along = f", along {found.along}" if found.along else ""
-    return f"{found.what}: {format_count(len(found.pieces), 'piece')}, {format_count(len(found.seams), 'seam')} of {total:.0f} cm{along}"
