@@ -15,12 +15,13 @@ from warpflat.garment.mannequin.body_landmarks import model_places
 from warpflat.garment.mannequin.body_model import finer_body
 from warpflat.garment.mannequin.common_body import CommonBody
 from warpflat.garment.mannequin.profiles import convex_girth
+from warpflat.garment.mannequin.scan_levels import TRUNK
 from warpflat.garment.mannequin.slicer import UP, Slicer
 
 __all__ = ["EASE_LEVELS", "level_ease", "widened"]
 
 #: Levels at which ease is measured, from the top down.
-EASE_LEVELS = ("bust", "underbust", "waist", "hip")
+EASE_LEVELS = TRUNK
 # Above the bust what is asked there fades out, up to here.
 _TOP = "front_neck"
 

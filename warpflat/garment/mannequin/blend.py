@@ -15,7 +15,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest, polyline_length, unit
 from warpflat.flat import vertex_normals
-from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS, RING_LEVELS, Layout
+from warpflat.garment.mannequin.layout import ARM_LEVELS, EASED_LEVELS, LEG_LEVELS, RING_LEVELS, Layout
 from warpflat.garment.mannequin.profiles import convex_girth, scale_to_girth, upper_hull
 from warpflat.garment.mannequin.sheet import fill_fork, fill_sheet, sheet_laplacian
 
@@ -107,10 +107,10 @@ def adjusted_vertices(
         InputError: for a level that cannot be adjusted, or an order that turns two profiles over.
     """
     ease = ease or {}
-    known = [*RING_LEVELS, "chest", *ARM_LEVELS[1:], *LEG_LEVELS]
+    known = [*EASED_LEVELS, "crotch"]
     for level in ease:
-        if level not in known or level == "crotch":
-            raise InputError(f"form: level {level!r} has no ease: {nearest(level, known)}")
+        if level not in EASED_LEVELS:
+            raise InputError(f"form: level {level!r} has no ease: {nearest(level, EASED_LEVELS)}")
     for level, change in profiles.items():
         for name in (level, change.like):
             if name is not None and name not in known:

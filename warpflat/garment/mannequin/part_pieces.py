@@ -114,8 +114,15 @@ def _parts(
     sides = [
         next((side for side in ("left", "right") if all(is_side(brick, side) for brick in part)), "") for part in groups
     ]
-    centre = "" in sides and any(sides)
-    across = [("side_" + side if centre else side) if side else ("centre" if centre else "") for side in sides]
+    columns = ["centre" if all(brick.endswith("-centre") for brick in part) else "side" for part in groups]
+    if len(set(columns)) == 1 or not any(sides):
+        columns = [("side" if side else "centre") if "" in sides and any(sides) else "" for side in sides]
+    across = [
+        column
+        if column == "centre" and columns.count("centre") == 1
+        else "_".join(word for word in (column, side) if word)
+        for column, side in zip(columns, sides, strict=True)
+    ]
     heights = [float(np.mean([vertices[layout.bricks[brick], 1].mean() for brick in part])) for part in groups]
     names = []
     for number, word in enumerate(across):

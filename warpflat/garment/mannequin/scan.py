@@ -117,7 +117,7 @@ def _profiles(
         around = np.vstack([curve, curve[:1]])
         front_x, back_x = (float(np.interp(height, known, widths[:, k])) for k in (0, 1))
         return Profile(
-            curve=curve, centre_front=0.0, side_left=_where(curve[:, 1], s, left, z), centre_back=float(s[half]),
+            curve=curve, side_left=_where(curve[:, 1], s, left, z), centre_back=float(s[half]),
             side_right=_where(curve[:, 1], s, right, z), girth=float(row_at(girth, y, height)),
             princess={
                 "front-left": _share(curve[: left + 1], front_x),

@@ -10,6 +10,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, InputError
 from warpflat.garment.mannequin.body_landmarks import height_of, near_level
+from warpflat.garment.mannequin.measurements import BELOW_CROTCH
 from warpflat.garment.mannequin.scan_pose import LEVELS_UP
 from warpflat.garment.mannequin.scan_sections import OUTLINES, BodySections, smooth
 from warpflat.garment.mannequin.slicer import UP
@@ -44,8 +45,6 @@ _CREASE, _KNEE_SURE = 0.03, 0.004
 _BELOW_UNDERBUST = 0.023
 # How far below the armpits the bust may lie at most, as a share of the stature: the rows above it need this room.
 _BELOW_ARMPIT = 0.006
-# The thigh's tape lies so far below the crotch, as a share of the stature: nearer sections hold a part of the seat.
-_BELOW_CROTCH = 0.03
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +80,7 @@ def find_levels(
         found[f"leg_{name}"] = ScanLevel(height=0.5 * (sides[0].height + sides[1].height), guess=guess)
         if name != "calf":
             found[name] = found[f"leg_{name}"]
-    found["leg_thigh"] = ScanLevel(height=body.crotch - _BELOW_CROTCH * size)
+    found["leg_thigh"] = ScanLevel(height=body.crotch - BELOW_CROTCH * size)
     hip = given.get("hip", found["hip"].height)
     found["thigh"] = ScanLevel(height=min(0.44 * size, body.crotch - 0.01 * size, hip - 0.05 * size))
     for name, height in given.items():

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpflat.core import FloatArray, InputError, arc_lengths, polyline_length, resample, unit
-from warpflat.garment.mannequin.blueprint import NOTCH, ArmCurves, Blueprint, Profile, QuarterCurves, mirrored
+from warpflat.garment.mannequin.blueprint import NOTCH, Blueprint, Profile, QuarterCurves
 from warpflat.garment.mannequin.layout import QUARTERS, RING_LEVELS
 from warpflat.garment.mannequin.measurements import Measurements, size_tables
 from warpflat.garment.mannequin.profiles import Section, section_curve
@@ -26,6 +26,8 @@ _SHOULDER_SLOPE = {"women": np.radians(21.0), "men": np.radians(22.0), "children
 # Where the side line passes the bust: this share of the way back from where it passes the underbust to the widest points.
 _SIDE_BACK = 0.25
 _ARM_ANGLE = np.radians(40.0)
+# To the other side of a symmetric body.
+_FLIP = np.array([-1.0, 1.0, 1.0])
 # How far [m] the biceps' row lies beyond the underarm: the shortest sleeve ends there, with a seam to sew. On a small child it is the
 # first of these shares of the arm, under a deep armhole the second one of the way to the elbow.
 _SHORTEST_SLEEVE, _SHORT_SHARE, _TO_ELBOW = 0.092, 0.2, 0.5
@@ -118,7 +120,7 @@ def _profiles(m: Measurements) -> Callable[[float], Profile]:
             np.interp(back_x, curve[half : half // 2 : -1, 0], s[half] - s[half : half // 2 : -1]) / (s[half] - side)
         )
         return Profile(
-            curve=curve, centre_front=0.0, side_left=side, centre_back=float(s[half]), side_right=float(s[-1] - side),
+            curve=curve, side_left=side, centre_back=float(s[half]), side_right=float(s[-1] - side),
             girth=float(g),
             princess={"front-left": ahead, "back-left": behind, "back-right": behind, "front-right": ahead},
         )  # fmt: skip
@@ -167,7 +169,8 @@ def _quarters(m: Measurements, profile: Callable[[float], Profile]) -> dict[str,
             chest=chest[face], centre=spline(np.linspace(0.0, polyline_length(centre), 100)),
         )  # fmt: skip
         curves[f"{face}-left"] = left
-        curves[f"{face}-right"] = mirrored(left)
+        flipped = {name: line * _FLIP for name, line in vars(left).items() if name != "notch"}
+        curves[f"{face}-right"] = replace(left, **flipped)
     return {name: curves[name] for name in QUARTERS}
 
 
@@ -239,8 +242,8 @@ def _neckline(m: Measurements) -> FloatArray:
     return loop(float(width))
 
 
-def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, ArmCurves]:
-    """Return both arms, which hang a little away from the body."""
+def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, dict[float, FloatArray]]:
+    """Return the curves around both arms, which hang a little away from the body."""
     front, back = quarters["front-left"].armhole, quarters["back-left"].armhole
     middle = np.vstack([front, back]).mean(axis=0)
     tip, under = front[0], front[-1]
@@ -263,9 +266,9 @@ def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, A
 
     elbow_at, under_at = start + 0.575 * length, float((under - middle) @ axis)
     biceps_at = under_at + min(_SHORTEST_SLEEVE, _SHORT_SHARE * length, _TO_ELBOW * (elbow_at - under_at))
-    left = ArmCurves(
-        biceps=ring(biceps_at, m.lengths["upper_arm"], 1.06, 0.0) + 0.006 * up,
-        elbow=ring(elbow_at, m.lengths["elbow"], 1.0, 0.004),
-        wrist=ring(start + length, m.lengths["wrist"], 1.15, 0.030),
-    )
-    return {"left": left, "right": mirrored(left)}
+    left = {
+        0.0: ring(biceps_at, m.lengths["upper_arm"], 1.06, 0.0) + 0.006 * up,
+        1.0: ring(elbow_at, m.lengths["elbow"], 1.0, 0.004),
+        2.0: ring(start + length, m.lengths["wrist"], 1.15, 0.030),
+    }
+    return {"left": left, "right": {place: curve * _FLIP for place, curve in left.items()}}
