@@ -10,7 +10,8 @@ from warpflat.core import FloatArray, InputError, arc_lengths, polyline_length, 
 from warpflat.garment.mannequin.blueprint import NOTCH, LegCurves, LegProfile, Profile, QuarterCurves
 from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.layout import LEG_LEVELS, QUARTERS
-from warpflat.garment.mannequin.rays import ray_radii, row_at, smooth_radii, with_harmonics
+from warpflat.garment.mannequin.rays import ray_radii, smooth_radii, with_harmonics
+from warpflat.garment.mannequin.sampled import row_at, smooth
 from warpflat.garment.mannequin.scan_sections import ArmSections, BodySections
 from warpflat.garment.mannequin.slicer import UP, Slicer
 from warpflat.garment.mannequin.table_legs import AROUND_LEG, crotch_curve, profile_of_curve
@@ -348,7 +349,7 @@ def leg_curves(body: BodySections, levels: Mapping[str, float], hip: Profile) ->
         places = (outermost * curves[side][..., 1]).sum(axis=1) / outermost.sum(axis=1)
         foot = legs.y < levels["leg_ankle"]
         places[foot] = places[~foot][0]
-        outseams[side] = gaussian_filter1d(places, _OUTSEAM_SIGMA, mode="nearest")
+        outseams[side] = smooth(places, _OUTSEAM_SIGMA)
 
     def profile(side: str, height: float) -> LegProfile:
         curve = row_at(curves[side], legs.y, height)

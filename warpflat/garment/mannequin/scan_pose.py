@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from warpflat.core import AXES, FloatArray, InputError, nearest, unit
 from warpflat.flat import METRES_PER_UNIT, join_labels, stray_vertex, stray_words
 from warpflat.garment.mannequin.layout import RING_LEVELS
+from warpflat.garment.mannequin.sampled import summit
 from warpflat.garment.mannequin.scan_repair import find_holes, smooth_noise, turned_outward
 from warpflat.garment.mannequin.slicer import UP, Slicer, plane_axes
-from warpflat.garment.mannequin.summit import summit
 
 __all__ = ["LANDMARKS", "LEVELS_UP", "ScanOptions", "across_trunk", "find_facing", "find_legs", "turn_scan_upright"]
 
