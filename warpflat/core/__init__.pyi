@@ -108,6 +108,7 @@ from .threads import thread_count as thread_count
 from .toml_file import Table as Table
 from .toml_file import check_table as check_table
 from .toml_file import in_metres as in_metres
+from .toml_file import read_shipped_toml as read_shipped_toml
 from .toml_file import read_toml as read_toml
 from .usd_layers import check_layers as check_layers
 from .usd_process import UNREADABLE as UNREADABLE

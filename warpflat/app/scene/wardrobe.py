@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import importlib.resources
 import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -12,7 +11,7 @@ from typing import Any
 
 from warpflat.app.scene.as_toml import document_as_toml, laid_over
 from warpflat.app.scene.style import STYLE_KEYS, with_style
-from warpflat.core import InputError, check_table, nearest, read_toml
+from warpflat.core import InputError, check_table, nearest, read_shipped_toml
 from warpflat.garment import MannequinTable, mannequin_from_table
 
 __all__ = ["GarmentOffer", "garment_offer", "offer_tables", "offers", "scene_text", "style_of", "taken_options"]
@@ -47,8 +46,7 @@ class GarmentOffer:
 @functools.cache
 def offers() -> Mapping[str, GarmentOffer]:
     """Return the garments of the wardrobe by name."""
-    with importlib.resources.as_file(importlib.resources.files("warpflat.app.scene") / "data/wardrobe.toml") as path:
-        tables = read_toml(path)
+    tables = read_shipped_toml("warpflat.app.scene", "wardrobe.toml")
     return {
         name: GarmentOffer(
             name=name,

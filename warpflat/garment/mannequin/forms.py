@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import functools
-import importlib.resources
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, IntArray, check_file_name, nearest, quote_value, same_file, short_repr
+from warpflat.core import (
+    FloatArray,
+    InputError,
+    IntArray,
+    check_file_name,
+    nearest,
+    quote_value,
+    read_shipped_toml,
+    same_file,
+    short_repr,
+)
 from warpflat.garment.mannequin.blend import Adjustment, adjusted_vertices, blend_forms, is_tight
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.darts import FormDart, PlacedDart, place_darts
@@ -35,11 +43,6 @@ from warpflat.garment.mannequin.sleeves import (
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.layout import Layout
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 __all__ = ["Form", "FormResult", "PieceRecipe", "form_from_mapping", "form_names", "realise", "shipped_form"]
 
@@ -151,10 +154,7 @@ class FormResult:
 
 @functools.cache
 def _shipped() -> dict[str, Any]:
-    text = (
-        importlib.resources.files("warpflat.garment.mannequin").joinpath("data/forms.toml").read_text(encoding="utf-8")
-    )
-    return tomllib.loads(text)
+    return read_shipped_toml("warpflat.garment.mannequin", "forms.toml")
 
 
 def form_names() -> list[str]:

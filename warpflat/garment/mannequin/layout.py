@@ -15,6 +15,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,7 +100,7 @@ class Strips:
     leg_row: Mapping[str, int]
     vertex_count: int
 
-    @property
+    @cached_property
     def mirror(self) -> IntArray:
         """#V, the mirror image of each vertex at the midplane."""
         out = np.full(self.vertex_count, -1, np.int32)

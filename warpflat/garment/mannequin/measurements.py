@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 import functools
-import importlib.resources
 import math
 import re
-import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from warpflat.core import InputError, expect, is_number, nearest
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from warpflat.core import InputError, expect, is_number, nearest, read_shipped_toml
 
 __all__ = [
     "BELOW_CROTCH",
@@ -76,10 +69,7 @@ class Measurements:
 @functools.cache
 def size_tables() -> dict[str, Any]:
     """Return the contents of ``data/sizes.toml``: size tables, completion rules, cross-sections, valid ranges."""
-    text = (
-        importlib.resources.files("warpflat.garment.mannequin").joinpath("data/sizes.toml").read_text(encoding="utf-8")
-    )
-    return tomllib.loads(text)
+    return read_shipped_toml("warpflat.garment.mannequin", "sizes.toml")
 
 
 def size_names() -> list[str]:

@@ -90,7 +90,7 @@ def find_levels(
         for level in (name, f"leg_{name}" if name != "thigh" else name):
             if level in found:
                 found[level] = ScanLevel(height=height)
-    for under, over in itertools.pairwise(LEVELS_UP):
+    for under, over in itertools.pairwise(name for name in LEVELS_UP if name in found):
         if found[over].height - found[under].height < 0.004 * size:
             raise InputError(
                 f"scan: {over} ({found[over].height:.3f} m) does not lie above {under} ({found[under].height:.3f} m); "
