@@ -102,6 +102,7 @@ from .text import other_side as other_side
 from .text import plain_letters as plain_letters
 from .text import quote_value as quote_value
 from .text import size_words as size_words
+from .text import some_of as some_of
 from .text import unnumbered as unnumbered
 from .text import without_side as without_side
 from .threads import thread_count as thread_count

@@ -11,7 +11,7 @@ from bodies import body_of_size
 from self_intersections import self_intersections
 
 from warpflat.core.errors import InputError
-from warpflat.garment.mannequin.blend import Adjustment, adjusted_vertices, blend_forms, bridge_rows
+from warpflat.garment.mannequin.blend import Adjustment, adjusted_vertices, bridge_rows
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.darts import standard_darts
 from warpflat.garment.mannequin.forms import Form, PieceRecipe, form_from_mapping, form_names
@@ -163,8 +163,6 @@ def test_weighted_blend_lies_between(body: Mannequin) -> None:
     mixed = body.form(form_from_mapping("mix", {"like": "skirt", "blend": {"with": "a_line_skirt", "weight": 0.25}}))
     assert np.allclose(mixed.vertices, 0.75 * a.vertices + 0.25 * b.vertices)
     assert list(mixed.pieces) == list(a.pieces)
-    with pytest.raises(InputError, match="one resolution"):
-        blend_forms(a.vertices, b.vertices[:-1], 0.5)
 
 
 def test_sizes_of_one_form_correspond(body: Mannequin) -> None:

@@ -20,7 +20,7 @@ from warpflat.garment.mannequin.profiles import convex_girth, scale_to_girth, up
 from warpflat.garment.mannequin.sampled import smooth, smoothstep
 from warpflat.garment.mannequin.sheet import fill_fork, fill_sheet, sheet_laplacian
 
-__all__ = ["Adjustment", "adjusted_vertices", "blend_forms", "bridge_row", "bridge_rows", "is_tight", "rule_rows"]
+__all__ = ["Adjustment", "adjusted_vertices", "bridge_row", "bridge_rows", "is_tight", "rule_rows"]
 
 # A fold's mitre runs off to nothing where trunk and arm lie against each other: at most twice as far as either side moves.
 _LEAST_MITRE = 0.5
@@ -71,19 +71,6 @@ class Adjustment:
 def is_tight(profiles: Mapping[str, Adjustment], ease: Mapping[str, float]) -> bool:
     """Return whether a form is meant to be tighter than its body somewhere, as a knit is."""
     return min(ease.values(), default=0.0) < 0.0 or any(p.scale < 1.0 or p.offset_cm < 0.0 for p in profiles.values())
-
-
-def blend_forms(first: FloatArray, second: FloatArray, weight: float) -> FloatArray:
-    """Return the surface between two forms of one layout; `weight` 0 is the first, 1 the second.
-
-    Raises:
-        InputError: if the forms are of different layouts or the weight is not from 0 to 1.
-    """
-    if first.shape != second.shape:
-        raise InputError(f"blend: the forms have {len(first)} and {len(second)} vertices; use one resolution for both")
-    if not 0.0 <= weight <= 1.0:
-        raise InputError(f"blend: weight {weight:g}: valid range 0 to 1")
-    return (1.0 - weight) * first + weight * second
 
 
 def adjusted_vertices(

@@ -20,7 +20,7 @@ from warpflat.core import (
     same_file,
     short_repr,
 )
-from warpflat.garment.mannequin.blend import Adjustment, adjusted_vertices, blend_forms, is_tight
+from warpflat.garment.mannequin.blend import Adjustment, adjusted_vertices, is_tight
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.darts import FormDart, PlacedDart, place_darts
 from warpflat.garment.mannequin.ease import ease_from
@@ -356,7 +356,7 @@ def _surface(
     tight = is_tight(form.profiles, form.ease)
     if form.blend is not None:
         other, weight = form.blend
-        vertices = blend_forms(vertices, _surface(layout, body, other, used), weight)
+        vertices = (1.0 - weight) * vertices + weight * _surface(layout, body, other, used)
         tight = tight or is_tight(other.profiles, other.ease)
     if neckline is not None:
         # It moves vertices within the form's faces, which are chords of the body's hollows.
