@@ -102,14 +102,12 @@ from .text import other_side as other_side
 from .text import plain_letters as plain_letters
 from .text import quote_value as quote_value
 from .text import size_words as size_words
-from .text import some_of as some_of
 from .text import unnumbered as unnumbered
 from .text import without_side as without_side
 from .threads import thread_count as thread_count
 from .toml_file import Table as Table
 from .toml_file import check_table as check_table
 from .toml_file import in_metres as in_metres
-from .toml_file import read_shipped_toml as read_shipped_toml
 from .toml_file import read_toml as read_toml
 from .usd_layers import check_layers as check_layers
 from .usd_process import UNREADABLE as UNREADABLE

@@ -19,7 +19,6 @@ __all__ = [
     "plain_letters",
     "quote_value",
     "size_words",
-    "some_of",
     "unnumbered",
     "without_side",
 ]
@@ -134,12 +133,6 @@ def one_line(text: str) -> str:
 def _shortened(text: str, most: int) -> str:
     half = (most - 3) // 2
     return text if len(text) <= most else f"{text[:half]}...{text[-half:]}"
-
-
-def some_of(names: Sequence[str], most: int) -> str:
-    """Return the first of some names, and how many more there are: "front, back and 3 more"."""
-    more = len(names) - most
-    return ", ".join(names[:most]) + (f" and {more:,} more" if more > 0 else "")
 
 
 def plain_letters(text: str) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 import types
 from collections.abc import Iterator, Mapping
-from importlib import resources
 from pathlib import Path
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
@@ -22,7 +21,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["Table", "check_table", "in_metres", "read_shipped_toml", "read_toml"]
+__all__ = ["Table", "check_table", "in_metres", "read_toml"]
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -60,12 +59,6 @@ def read_toml(path: Path) -> dict[str, Any]:
             raise InputError(f"has a number of thousands of digits; {RIGHT_NUMBER}") from None
         check_values(tables)
     return tables
-
-
-def read_shipped_toml(package: str, name: str) -> dict[str, Any]:
-    """Read the tables of a file in the folder `data` of a package, as "warpflat.garment.mannequin"."""
-    with resources.as_file(resources.files(package) / "data" / name) as path:
-        return read_toml(path)
 
 
 def check_table(model: type[Model], data: Mapping[str, Any], where: str = "") -> Model:

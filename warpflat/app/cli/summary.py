@@ -9,7 +9,7 @@ from typing import Any
 
 from warpflat.app.cli.tables import cut_words
 from warpflat.app.review.figures import count_pieces
-from warpflat.core import energy_words, format_count, some_of
+from warpflat.core import energy_words, format_count
 from warpflat.garment import LACKING, NO_PATTERN
 
 __all__ = ["notes_line", "summary_lines"]
@@ -37,7 +37,7 @@ def summary_lines(
     pieces, verdict, lines = metrics["pieces"], metrics.get("verdict"), list[str]()
     unfinished = [name for name, piece in pieces.items() if not piece["stages"][-1]["converged"]]
     flips = sum(piece["flipped_faces"] for piece in pieces.values())
-    wrong = [f"NOT at rest: {some_of(unfinished, 3)}"] if unfinished else []
+    wrong = [f"NOT at rest: {_some(unfinished)}"] if unfinished else []
     wrong += [format_count(flips, "flipped face")] if flips else []
     findings = verdict["findings"] if verdict else []
     failing, told = ([each for each in findings if each["fails"] is fails] for fails in (True, False))
@@ -98,6 +98,12 @@ def notes_line(notes: Sequence[str]) -> str:
             return f"note: {line}"
     rest = f"; {len(parts) - 1} more" if len(parts) > 1 else ""
     return f"note: {parts[0]}{rest}" + ("; -v lists them" if rest else "") if parts else ""
+
+
+def _some(names: Sequence[str]) -> str:
+    """Return up to three names, and how many more there are."""
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return ", ".join(names[:3]) + more
 
 
 def _listed(head: str, parts: Sequence[str], width: int | None) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import importlib.resources
 import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,7 +12,7 @@ from typing import Any
 
 from warpflat.app.scene.as_toml import document_as_toml, laid_over
 from warpflat.app.scene.style import STYLE_KEYS, with_style
-from warpflat.core import InputError, check_table, nearest, read_shipped_toml
+from warpflat.core import InputError, check_table, nearest, read_toml
 from warpflat.garment import MannequinTable, mannequin_from_table
 
 __all__ = ["GarmentOffer", "garment_offer", "offer_tables", "offers", "scene_text", "style_of", "taken_options"]
@@ -46,7 +47,8 @@ class GarmentOffer:
 @functools.cache
 def offers() -> Mapping[str, GarmentOffer]:
     """Return the garments of the wardrobe by name."""
-    tables = read_shipped_toml("warpflat.app.scene", "wardrobe.toml")
+    with importlib.resources.as_file(importlib.resources.files("warpflat.app.scene") / "data/wardrobe.toml") as path:
+        tables = read_toml(path)
     return {
         name: GarmentOffer(
             name=name,

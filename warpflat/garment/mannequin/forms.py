@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from warpflat.core import (
     check_file_name,
     nearest,
     quote_value,
-    read_shipped_toml,
+    read_toml,
     same_file,
     short_repr,
 )
@@ -154,7 +155,8 @@ class FormResult:
 
 @functools.cache
 def _shipped() -> dict[str, Any]:
-    return read_shipped_toml("warpflat.garment.mannequin", "forms.toml")
+    with resources.as_file(resources.files("warpflat.garment.mannequin") / "data/forms.toml") as path:
+        return read_toml(path)
 
 
 def form_names() -> list[str]:

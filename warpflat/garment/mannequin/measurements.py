@@ -7,11 +7,12 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from importlib import resources
 from typing import Any
 
 import numpy as np
 
-from warpflat.core import InputError, expect, is_number, nearest, read_shipped_toml
+from warpflat.core import InputError, expect, is_number, nearest, read_toml
 
 __all__ = [
     "BELOW_CROTCH",
@@ -69,7 +70,8 @@ class Measurements:
 @functools.cache
 def size_tables() -> dict[str, Any]:
     """Return the contents of ``data/sizes.toml``: size tables, completion rules, cross-sections, valid ranges."""
-    return read_shipped_toml("warpflat.garment.mannequin", "sizes.toml")
+    with resources.as_file(resources.files("warpflat.garment.mannequin") / "data/sizes.toml") as path:
+        return read_toml(path)
 
 
 def size_names() -> list[str]:

@@ -6,9 +6,10 @@ import functools
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from importlib import resources
 from typing import Any
 
-from warpflat.core import line_name, other_side, polyline_length, read_shipped_toml, without_side
+from warpflat.core import line_name, other_side, polyline_length, read_toml, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.pieces import Elastic, Piece, Seam, SeamSide
@@ -27,7 +28,8 @@ GATHERED = 0.15
 @functools.cache
 def techniques() -> Mapping[str, Mapping[str, Any]]:
     """Return what things are sewn by, each technique as `data/techniques.toml` describes it."""
-    return read_shipped_toml("warpflat.pattern.drafting", "techniques.toml")
+    with resources.as_file(resources.files("warpflat.pattern.drafting") / "data/techniques.toml") as path:
+        return read_toml(path)
 
 
 @dataclass(kw_only=True, eq=False)

@@ -10,8 +10,9 @@ import functools
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from importlib import resources
 
-from warpflat.core import read_shipped_toml
+from warpflat.core import read_toml
 
 __all__ = ["as_sentence", "language_words", "letters_of", "listed", "printed_in", "translate", "translate_name"]
 
@@ -24,7 +25,8 @@ def language_words(language: str) -> Mapping[str, str]:
     """Return the table of a language, ``"en"`` or ``"de"``: what is printed, by the English phrase or name."""
     if language == "en":
         return _EMPTY
-    tables = read_shipped_toml("warpflat.pattern.drafting", f"words_{language}.toml")
+    with resources.as_file(resources.files("warpflat.pattern.drafting") / f"data/words_{language}.toml") as path:
+        tables = read_toml(path)
     return {**tables["names"], **tables["phrases"]}
 
 

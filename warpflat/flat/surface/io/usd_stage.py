@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
-from warpflat.core.text import quote_value, some_of
+from warpflat.core.text import quote_value
 from warpflat.core.usd_layers import check_layers
 from warpflat.core.usd_process import UNREADABLE
 from warpflat.flat.surface.io.raw_mesh import ALL_PRIMS, RawMesh, numbered, objects_in_turn
@@ -135,7 +135,8 @@ def _chosen(meshes: Sequence[Any], prim: str | None) -> Sequence[Any]:
     if not meshes:
         raise InputError("holds no mesh prim")
     if prim is None and len(meshes) > 1:
-        raise InputError(f"holds {len(meshes)} mesh prims; choose one with prim = one of: {some_of(paths, 8)}")
+        some = ", ".join(paths[:8]) + (f" and {len(paths) - 8} more" if len(paths) > 8 else "")
+        raise InputError(f"holds {len(meshes)} mesh prims; choose one with prim = one of: {some}")
     if prim is None or prim == ALL_PRIMS:
         return meshes
     chosen = [p for p in meshes if str(p.GetPath()) == prim] or [p for p in meshes if p.GetName() == prim]

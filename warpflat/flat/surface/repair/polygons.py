@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IndexArray, IntArray
 from warpflat.core.errors import InputError
-from warpflat.core.text import some_of
 from warpflat.core.vectors import unit
 from warpflat.flat.surface.half_edges import HalfEdges
 from warpflat.flat.surface.vectors import cross, dot, points_at
@@ -35,7 +34,9 @@ _MOST_CORNERS = 2**27
 
 def list_some(indices: ArrayLike) -> str:
     """Return the beginning of a list of indices and the number of the others, such as `3, 4, 9 and 12 more`."""
-    return some_of([str(i) for i in np.asarray(indices).ravel().tolist()], _MOST_LISTED)
+    values = np.asarray(indices).ravel()
+    shown = ", ".join(str(int(i)) for i in values[:_MOST_LISTED])
+    return shown if len(values) <= _MOST_LISTED else f"{shown} and {len(values) - _MOST_LISTED:,} more"
 
 
 def pad_polygons(polygons: ArrayLike | Sequence[Sequence[int]]) -> NDArray[np.int64]:
