@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import FloatArray, arc_lengths
+from warpflat.core import AXES, FloatArray, arc_lengths, reflected
 from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.blueprint import Blueprint, Profile
 from warpflat.garment.mannequin.builder import build_vertices
@@ -235,4 +235,4 @@ def sides_note(vertices: FloatArray, layout: Layout, *, averaged: bool) -> tuple
 
 
 def _mirror_image(vertices: FloatArray, layout: Layout) -> FloatArray:
-    return vertices[layout.mirror] * np.array([-1.0, 1.0, 1.0])
+    return reflected(vertices[layout.mirror], AXES["+x"])

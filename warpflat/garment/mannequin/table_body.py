@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, arc_lengths, polyline_length, resample, unit
+from warpflat.core import AXES, FloatArray, InputError, arc_lengths, polyline_length, reflected, resample, unit
 from warpflat.garment.mannequin.blueprint import NOTCH, Blueprint, Profile, QuarterCurves
 from warpflat.garment.mannequin.layout import QUARTERS, RING_LEVELS
 from warpflat.garment.mannequin.measurements import Measurements, size_tables
@@ -26,8 +26,6 @@ _SHOULDER_SLOPE = {"women": np.radians(21.0), "men": np.radians(22.0), "children
 # Where the side line passes the bust: this share of the way back from where it passes the underbust to the widest points.
 _SIDE_BACK = 0.25
 _ARM_ANGLE = np.radians(40.0)
-# To the other side of a symmetric body.
-_FLIP = np.array([-1.0, 1.0, 1.0])
 # How far [m] the biceps' row lies beyond the underarm: the shortest sleeve ends there, with a seam to sew. On a small child it is the
 # first of these shares of the arm, under a deep armhole the second one of the way to the elbow.
 _SHORTEST_SLEEVE, _SHORT_SHARE, _TO_ELBOW = 0.092, 0.2, 0.5
@@ -169,7 +167,7 @@ def _quarters(m: Measurements, profile: Callable[[float], Profile]) -> dict[str,
             chest=chest[face], centre=spline(np.linspace(0.0, polyline_length(centre), 100)),
         )  # fmt: skip
         curves[f"{face}-left"] = left
-        flipped = {name: line * _FLIP for name, line in vars(left).items() if name != "notch"}
+        flipped = {name: reflected(line, AXES["+x"]) for name, line in vars(left).items() if name != "notch"}
         curves[f"{face}-right"] = replace(left, **flipped)
     return {name: curves[name] for name in QUARTERS}
 
@@ -271,4 +269,4 @@ def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, d
         1.0: ring(elbow_at, m.lengths["elbow"], 1.0, 0.004),
         2.0: ring(start + length, m.lengths["wrist"], 1.15, 0.030),
     }
-    return {"left": left, "right": {place: curve * _FLIP for place, curve in left.items()}}
+    return {"left": left, "right": {place: reflected(curve, AXES["+x"]) for place, curve in left.items()}}
