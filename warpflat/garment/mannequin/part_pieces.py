@@ -15,7 +15,7 @@ from warpflat.garment.mannequin.forms import Form, PieceRecipe
 from warpflat.garment.mannequin.halves import is_side
 from warpflat.garment.mannequin.layout import Layout
 
-__all__ = ["part_pieces", "princess_seams", "taken_over"]
+__all__ = ["part_pieces", "part_recipe", "princess_seams", "taken_over"]
 
 
 def part_pieces(layout: Layout, vertices: FloatArray, form: Form, seams: Sequence[FormDart]) -> Form:
@@ -131,11 +131,16 @@ def _parts(
         place = "" if len(alike) == 1 else ("lower", "upper")[at] if len(alike) == 2 else f"{at + 1}"
         names.append("_".join(part for part in (word, place) if part))
     for part, ending in zip(groups, names, strict=True):
-        bounds = layout.edges_of(part)
-        through = [line for line in (recipe.datum, *lines) if line and layout.edges_along(line) & bounds]
-        inner = [line for line in recipe.open if layout.edges_along(line) & bounds]
-        found[f"{name}_{ending}"] = PieceRecipe(bricks=tuple(part), datum=(through or [""])[0], open=tuple(inner))
+        found[f"{name}_{ending}"] = part_recipe(layout, recipe, part, lines)
     return found
+
+
+def part_recipe(layout: Layout, recipe: PieceRecipe, bricks: Sequence[str], lines: Sequence[str]) -> PieceRecipe:
+    """Return the recipe of a part of a piece: with its datum if that runs there, else the first of the lines that part it there."""
+    bounds, inside = layout.edges_of(bricks), layout.edges_of(bricks, inside=True)
+    through = [line for line in (recipe.datum, *lines) if line and layout.edges_along(line) & bounds]
+    opened = tuple(line for line in recipe.open if layout.edges_along(line) & inside)
+    return PieceRecipe(bricks=tuple(bricks), datum=(through or [""])[0], open=opened)
 
 
 def _labels(layout: Layout, bricks: Sequence[str], lines: Sequence[str]) -> IntArray:
