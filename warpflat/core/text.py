@@ -141,12 +141,12 @@ def plain_letters(text: str) -> str:
     return "".join(letter for letter in apart if not unicodedata.combining(letter))
 
 
-def find_unused_name(name: str, taken: Container[str]) -> str:
-    """Return the name itself if it is not in `taken`, else "name 2" or the first number after that which is free."""
+def find_unused_name(name: str, taken: Container[str], *, joint: str = " ") -> str:
+    """Return the name itself if it is not in `taken`, else "name 2" or the first number after that which is free, joined so."""
     number = 2
-    while f"{name} {number}" in taken:
+    while f"{name}{joint}{number}" in taken:
         number += 1
-    return f"{name} {number}" if name in taken else name
+    return f"{name}{joint}{number}" if name in taken else name
 
 
 def name_without_number(name: str, names: Container[str]) -> str:

@@ -157,6 +157,22 @@ def test_the_back_is_double_the_front_is_single(dress):
     assert not any(n.double for n in pieces["back bodice"].notches if n.seam == "side")
 
 
+@pytest.mark.parametrize("at", ["back", ""])
+def test_a_back_is_told_by_where_it_is_worn_as_by_its_name(at: str) -> None:
+    """A panel of GarmentCode says where it hangs: its name need not."""
+    corners = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.3), (0.0, 0.3)]
+    panels = [polygon("right_btorso", corners, at=at), polygon("left_btorso", corners, at=at)]
+    seam = Seam(
+        name="s",
+        sides=(
+            (SeamSide(piece="right_btorso", edge="e1"),),
+            (SeamSide(piece="left_btorso", edge="e3", reversed=True),),
+        ),
+    )
+    made = draft_garment(Pattern(name="g", pieces={"": panels}, seams=[seam]))
+    assert {notch.double for piece in made.pieces[""] for notch in piece.notches} == {at == "back"}
+
+
 def test_curves_keep_corners_and_stay_within_a_tenth_of_a_millimetre(dress):
     for piece in draft_garment(dress.garment, sizes=("38",), true=False).pieces["38"]:
         for edge in piece.edges:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from warpflat.core.errors import InputError
+from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.pieces import Pattern
 from warpflat.pattern.export.read_dxf import read_dxf
 from warpflat.pattern.export.read_pattern import read_drafted
@@ -287,6 +288,8 @@ def test_freesewing_marks_its_folds(tmp_path: Path) -> None:
     assert [round(1e3 * edge.length) for edge in piece.edges if edge.kind == "fold"] == [300]
     assert piece.grain is not None
     assert np.ptp(piece.grain[:, 0]) < 1e-9
+    # The line is drawn from the neck down; the piece is not turned upside down for that.
+    assert draft_garment(found, true=False).pieces[""][0].frame[:, :2] == pytest.approx(np.eye(2), abs=1e-9)
     assert piece.edges[0].allowance == pytest.approx(0.010)
 
 

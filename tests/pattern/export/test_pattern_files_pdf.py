@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 import shapely
 from PIL import Image
-from polygons import corners_of, polygon
+from polygons import corners_of, polygon, sewn
 from pypdf import PdfReader
 
 from warpflat.core.errors import InputError
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.half_pieces import halved
 from warpflat.pattern.drafting.pieces import Pattern
+from warpflat.pattern.drafting.sewing_order import seam_letters
 from warpflat.pattern.export.pdf import PAPERS, draw_sheet, write_pdf
 from warpflat.pattern.export.pdf_legend import TEST_INCHES, TEST_MM
 from warpflat.pattern.export.pdf_tiling import LEGEND_SIZE
@@ -269,3 +270,17 @@ def test_unknown_paper_is_refused(dress, tmp_path):
     with pytest.raises(InputError, match="did you mean 'A4'"):
         write_pdf(dress, tmp_path / "p.pdf", paper="A44")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_every_seam_has_its_letter_on_the_sheets():
+    """Seams that are too short for a notch, such as a shoulder of 5 cm, have it on both edges."""
+    pieces = [polygon(name, corners_of(0.05, 0.3)) for name in ("front", "back")]
+    seams = [sewn("front.e0", "back.e2", "shoulder"), sewn("front.e1", "back.e3", "side")]
+    garment = draft_garment(Pattern(name="top", pieces={"": pieces}, seams=seams))
+    notched = {notch.seam for piece in garment.pieces[""] for notch in piece.notches}
+    assert notched == {"side"}
+    letters = set(seam_letters(garment).values())
+    assert len(letters) == 2
+    _, drawings = draw_sheet(halved(garment), "A4")
+    for (drawing,) in drawings:
+        assert letters <= {words.text for words in drawing.words}

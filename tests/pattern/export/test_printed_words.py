@@ -14,7 +14,6 @@ from pypdf import PdfReader
 from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
-from warpflat.pattern.drafting.cut_list import cloths_of
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.drawing import draw_piece
@@ -174,7 +173,14 @@ def test_what_is_cut_from_a_cloth_is_told_with_all_mirrored_copies(tmp_path: Pat
     cuff = polygon(
         "cuff", [(0.0, 0.0), (0.2, 0.0), (0.3, 0.1)], fabric="wool", quantity=4, also={"fusible": 2, "wool": 2}
     )
-    assert cloths_of(drafted(cuff).pieces[""][0]) == {"wool": 6, "fusible": 2}
+    assert cuff.cloths == {"wool": 6, "fusible": 2}
+    # Also on its label, and in a file for other programs.
+    label = [text for text, _ in drafted(cuff).pieces[""][0].label.lines]
+    assert label[1:3] == ["Cut 6, 3 mirrored - wool", "Cut 2, 1 mirrored - fusible"]
+    write_dxf(drafted(cuff), tmp_path / "p.dxf")
+    written = (tmp_path / "p.dxf").read_text()
+    assert "QUANTITY: 6\n" in written
+    assert all(f"ANNOTATION: {row}\n" in written for row in label[1:3])
     write_pdf(drafted(cuff), tmp_path / "p.pdf")
     said = " ".join(page.extract_text() for page in PdfReader(tmp_path / "p.pdf").pages)
     assert "cuff 6, 3 mirrored" in said

@@ -1,6 +1,6 @@
 """Girths: what a tape reads around the body, around the form, and along the pattern with its darts and seams closed.
 
-Around trunk, arms and legs tapes are level; at the neck and around an armhole they follow the line.
+Around trunk, arms and legs tapes are level; at the neck, around an armhole and along a hem they follow the line.
 """
 
 from __future__ import annotations
@@ -89,7 +89,8 @@ def pattern_girths(
 
     The pattern's girth is the length of the level's line in the pieces: a dart on the way adds nothing, nor does a seam. Where
     two pieces meet along the level it is the mean of both. A half piece counts twice. Where the line slopes on the form, as at
-    the bust under a lowered armhole, each of its edges counts by its level share, as the tapes around body and form are level.
+    the bust under a lowered armhole, each of its edges counts by its level share, as the tapes around body and form are level; a hem
+    is as long as it is cut.
 
     Args:
         mannequin: the body.
@@ -102,7 +103,8 @@ def pattern_girths(
 
     def measure(name: str, row: IntArray, edges: RowEdges, tape: Callable[[FloatArray], float]) -> None:
         pattern = float(edges.lengths(positions, len(row)).sum())
-        body, designed = (tape(points[row]) for points in (mannequin.vertices, form.vertices))
+        body = tape(mannequin.vertices[row])
+        designed = polyline_length(form.vertices[row], closed=True) if edges.is_hem else tape(form.vertices[row])
         found[name] = {"body_m": body, "form_m": designed, "pattern_m": pattern, "ease_m": pattern - body}
 
     for level in reversed(RING_LEVELS):

@@ -30,11 +30,13 @@ class RowEdges:
         ends: by piece, #E by 2, its vertices.
         column: by piece, #E, the edge of the row, counted from its first vertex.
         shares: by piece, #E, by how much each counts in the girth: half where two pieces meet, and by its level share.
+        is_hem: whether the row is an edge of the garment.
     """
 
     ends: Mapping[str, IntArray]
     column: Mapping[str, IntArray]
     shares: Mapping[str, FloatArray]
+    is_hem: bool
 
     def lengths(self, positions: Mapping[str, FloatArray], columns: int) -> FloatArray:
         """Return what each edge of the row has in the pattern, `columns` of them [m].
@@ -56,18 +58,20 @@ class PieceEdges:
     def __init__(self, layout: Layout, form: FormResult) -> None:
         self._form, self._mirror, self._count = form, layout.mirror, layout.vertex_count
         self._names = list(form.pieces)
-        ends = [half_edges_of(piece.surface).edges for piece in form.pieces.values()]
+        sides = [half_edges_of(piece.surface) for piece in form.pieces.values()]
+        ends = [each.edges for each in sides]
         keys = [self._keys(piece.grid_vertices[edges]) for piece, edges in zip(form.pieces.values(), ends, strict=True)]
         order = np.argsort(np.concatenate(keys), kind="stable")
         self._sorted = np.concatenate(keys)[order]
         self._ends = np.concatenate(ends)[order]
+        self._border = np.concatenate([each.count for each in sides])[order] == 1
         self._piece = np.repeat(np.arange(len(ends)), [len(edges) for edges in ends])[order]
 
     def along(self, row: IntArray, axis: FloatArray = UP) -> RowEdges | None:
         """Return the edges of pieces along a closed row; None where the pieces do not go all around.
 
         The right half of a half piece is its left one. Where the row slopes on the form, as at the bust under a lowered
-        armhole, each of its edges counts by the share of it that is level, as tapes are level.
+        armhole, each of its edges counts by the share of it that is level, as tapes are level; those of a hem count whole.
 
         Args:
             row: vertices of the grid, the first not repeated.
@@ -82,6 +86,9 @@ class PieceEdges:
         if not copies.all():
             return None
         first = np.searchsorted(self._sorted, keys)
+        is_hem = bool((copies == 1).all() and self._border[first].all())
+        if is_hem:
+            level_share[:] = 1.0
         column = np.repeat(np.arange(len(keys)), copies)
         at = np.repeat(first, copies) + np.arange(len(column)) - np.repeat(np.cumsum(copies) - copies, copies)
         share = (level_share / copies)[column]
@@ -91,6 +98,7 @@ class PieceEdges:
             ends={name: self._ends[at[chosen]] for name, chosen in of.items()},
             column={name: column[chosen].astype(np.int32) for name, chosen in of.items()},
             shares={name: share[chosen] for name, chosen in of.items()},
+            is_hem=is_hem,
         )
 
     def _copies(self, keys: IntArray) -> IntArray:

@@ -412,9 +412,10 @@ def lay_pieces(
     up, hints = np.zeros(len(cloth.designed)), np.zeros((len(cloth.designed), 3))
     for name, rows in cloth.piece_vertices.items():
         own, flat = cloth.welded[rows], meshes[name].points
-        told = pieces[name].at or next((side for side in ("front", "back") if side in name.lower()), "")
         up[own] = hung[name][:, 1] if is_hung else flat[:, 1] - flat[:, 1].mean()
-        hints[own] = np.sign(hung[name] - middle) * [1.0, 0.0, 1.0] if is_hung else _LOOKS.get(told, np.zeros(3))
+        hints[own] = (
+            np.sign(hung[name] - middle) * [1.0, 0.0, 1.0] if is_hung else _LOOKS.get(pieces[name].worn_at, np.zeros(3))
+        )
     # A file's own levels, where it has some.
     off = [
         heights[level] - float(hung[name][meshes[name].edges[edge], 1].mean())

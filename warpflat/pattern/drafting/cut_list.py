@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from warpflat.pattern.drafting.drafted import DraftedPiece
 from warpflat.pattern.drafting.sewing_tasks import piece_titles
 
-__all__ = ["CutEntry", "cloths_of", "cut_list", "turned_over"]
+__all__ = ["CutEntry", "cut_list"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,27 +30,15 @@ class CutEntry:
     mirrored: int
 
 
-def cloths_of(piece: DraftedPiece) -> dict[str, int]:
-    """Return the cloths from which a piece is cut, and how often."""
-    cloth, also = piece.piece.fabric, piece.piece.also
-    return {cloth: 0, **also} | {cloth: piece.piece.quantity + also.get(cloth, 0)}
-
-
-def turned_over(piece: DraftedPiece, quantity: int) -> list[bool]:
-    """Return of each copy of a piece whether it is cut turned over: every second one of pairs."""
-    pairs = piece.piece.paired and not piece.piece.on_fold and quantity % 2 == 0
-    return [pairs and k % 2 == 1 for k in range(quantity)]
-
-
 def cut_list(pieces: Sequence[DraftedPiece]) -> dict[str, list[CutEntry]]:
     """Return by cloth what is cut from it, the shell first."""
     titles = piece_titles([piece.piece for piece in pieces])
     found: dict[str, list[CutEntry]] = {}
     for piece in pieces:
-        for cloth, quantity in cloths_of(piece).items():
+        for cloth, quantity in piece.piece.cloths.items():
             entry = CutEntry(
                 piece=piece.name, title=titles[piece.name], quantity=quantity, on_fold=piece.piece.on_fold,
-                mirrored=sum(turned_over(piece, quantity)),
+                mirrored=sum(piece.piece.turned_over(quantity)),
             )  # fmt: skip
             found.setdefault(cloth, []).append(entry)
     return found

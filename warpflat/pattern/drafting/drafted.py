@@ -242,6 +242,11 @@ class Notch:
     def double(self) -> bool:
         return len(self.base) == 2
 
+    @property
+    def slits(self) -> list[FloatArray]:
+        """What is cut, 2 by 2 [m] each, from the cut line inwards."""
+        return [np.stack([base, base + self.depth * self.direction]) for base in self.base]
+
 
 @dataclass(frozen=True, kw_only=True)
 class SeamReport:

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core import FloatArray, name_without_number, polyline_length, resample, unit, without_side
+from warpflat.core import (
+    FloatArray,
+    arc_lengths,
+    name_without_number,
+    points_at_lengths,
+    polyline_length,
+    resample,
+    unit,
+    without_side,
+)
 from warpflat.pattern.drafting.curves import Curve, fit_curve
 from warpflat.pattern.drafting.draft import nest_label
 from warpflat.pattern.drafting.drafted import DraftedEdge, DraftedPiece
@@ -41,6 +50,8 @@ NAME_SHARES = (0.25, 0.2, 0.3, 0.15, 0.35, 0.4, 0.1, 0.6, 0.7, 0.8, 0.5)
 CLEAR, WELL_CLEAR, LETTER_CLEAR = 0.0004, 0.006, 0.001
 #: Height [m] of a seam's letter beside a notch, and its distance from it.
 LETTER, LETTER_GAP = 0.0026, 0.0012
+#: Where along an edge without a notch its seam's letter stands, in order of preference.
+LETTER_SHARES = (0.5, 0.4, 0.6, 0.3, 0.7)
 #: What lies closer [m] to a fold lies on it.
 ON_FOLD = 1e-5
 #: No words stand so far beyond a fold [m].
@@ -70,20 +81,27 @@ class Stroke:
     curve: Curve | None = None
     hidden: bool = False
 
+    @property
+    def path(self) -> FloatArray:
+        """Points (#P by 2 [m]) from its first to its last; the first of a closed line is both."""
+        return np.concatenate([self.points, self.points[:1]]) if self.closed else self.points
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OnPaper:
-    """What printing changes: a fold is not cut, words cross no joint, notches have letters.
+    """What printing changes: a fold is not cut, words cross no joint, seams have letters.
 
     Attributes:
         joints: lines (2 by 2 [m]) where sheets of paper meet or end.
         outside: what no sheet shows.
         letters: of seams, by their names.
+        sewn: the seams that an edge is sewn in, by the names of its piece and its own.
     """
 
     joints: Sequence[FloatArray] = ()
     outside: Geometry | None = None
     letters: Mapping[str, str] = field(default_factory=dict)
+    sewn: Mapping[tuple[str, str], Sequence[str]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -251,10 +269,9 @@ def _detail_strokes(piece: DraftedPiece) -> list[Stroke]:
         if dart.fold is not None
     ]
     for index, notch in enumerate(piece.notches):
-        for slit, base in enumerate(notch.base):
-            name = f"notch{index}.{notch.seam}" + (f".{slit}" if notch.double else "")
-            line = np.stack([base, base + notch.depth * notch.direction])
-            strokes.append(Stroke(role="notch", name=name, points=line))
+        for number, slit in enumerate(notch.slits):
+            name = f"notch{index}.{notch.seam}" + (f".{number}" if notch.double else "")
+            strokes.append(Stroke(role="notch", name=name, points=slit))
     for hole in piece.drill_holes:
         turn = np.linspace(0, 2 * np.pi, 17)[:-1]
         ring = hole.at + DRILL * np.column_stack([np.cos(turn), np.sin(turn)])
@@ -278,8 +295,8 @@ def _detail_strokes(piece: DraftedPiece) -> list[Stroke]:
 class _Annotations:
     """Grain, internal lines, leader and brackets of folds of a piece, and its words, which keep clear of each other.
 
-    An edge's name stands inside the sewing line, a dart's beside its first leg, a seam's letter beside its notch, in the
-    allowance. Nothing is written across a joint.
+    An edge's name stands inside the sewing line, a dart's beside its first leg, a seam's letter beside its notch, or in the
+    middle of an edge without one, in the allowance. Nothing is written across a joint.
 
     Attributes:
         strokes, words: what is drawn and written.
@@ -334,6 +351,7 @@ class _Annotations:
         self._name_buttons(drawn)
         if paper is not None:
             self._letter_notches(paper.letters, beyond, slits)
+            self._letter_edges(paper)
 
     def _write(
         self, text: str, height: float, places: Iterable[Spot] | FloatArray, *, bold: bool = False, **clear: Any
@@ -453,6 +471,20 @@ class _Annotations:
             clear = np.array(away) > half - LETTER_GAP
             spots = np.array(places)[clear if clear.any() else slice(None)]
             self._write(letter, LETTER, spots, bold=True, avoid=slits, enough=LETTER_CLEAR)
+
+    def _letter_edges(self, paper: OnPaper) -> None:
+        """Write the letters of seams that have no notch on the piece, as short ones, in the allowance of their edges."""
+        notched = {paper.letters.get(notch.seam) for notch in self._piece.notches}
+        for edge in self._piece.edges:
+            seams = paper.sewn.get((self._piece.name, edge.name), ())
+            letters = dict.fromkeys(paper.letters[seam] for seam in seams if seam in paper.letters)
+            for letter in (each for each in letters if each not in notched):
+                arc = arc_lengths(edge.line)
+                at = points_at_lengths(edge.line, arc[-1] * np.array(LETTER_SHARES))
+                ahead = points_at_lengths(edge.line, np.minimum(arc[-1] * np.array(LETTER_SHARES) + LETTER, arc[-1]))
+                along = unit(ahead - at)
+                out = np.column_stack([along[:, 1], -along[:, 0]])
+                self._write(letter, LETTER, at + max(edge.width / 2, LETTER) * out, bold=True, enough=LETTER_CLEAR)
 
 
 @lru_cache(maxsize=1024)

@@ -51,7 +51,7 @@ def is_symmetric(piece: DraftedPiece) -> bool:
 
     if piece.piece.on_fold or len(piece.piece.edges) < 2 or piece.cutouts:
         return False
-    if any(name.startswith("pleat fold") for name in piece.internal_lines):
+    if piece.piece.pleats:
         # Knife pleats all turn one way.
         return False
     axis = _axis(piece)

@@ -168,10 +168,8 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
     lines = [piece.printed_name.upper()]
     if piece.size:
         lines.append(as_sentence(printed_size(piece.size)))
-    lines.append(cutting_words(piece) + (f" - {piece.fabric}" if piece.fabric else ""))
-    lines += [
-        f"{cutting_words(replace(piece, quantity=count, also={}))} - {cloth}" for cloth, count in piece.also.items()
-    ]
+    cloths = piece.cloths.items()
+    lines += [cutting_words(piece, count) + (f" - {cloth}" if cloth else "") for cloth, count in cloths]
     allowances = []
     for kind, values in allowances_of(((edge.kind, edge.width) for edge in piece.edges), piece.units).items():
         if values:
@@ -199,13 +197,13 @@ def allowances_of(edges: Iterable[tuple[str, float]], units: str) -> dict[str, l
     return {kind: [length_words(width, units) for width in sorted(row)] for kind, row in widths.items()}
 
 
-def cutting_words(piece: Piece) -> str:
-    """Return how often a piece is cut, and how."""
+def cutting_words(piece: Piece, count: int) -> str:
+    """Return how often a piece is cut from a cloth, and how."""
     if piece.on_fold:
-        return translate("Cut {count} on fold", count=piece.quantity)
-    if piece.quantity % 2 == 0 and piece.paired:
-        return translate("Cut {count}, {mirrored} mirrored", count=piece.quantity, mirrored=piece.quantity // 2)
-    return translate("Cut {count}", count=piece.quantity)
+        return translate("Cut {count} on fold", count=count)
+    if mirrored := sum(piece.turned_over(count)):
+        return translate("Cut {count}, {mirrored} mirrored", count=count, mirrored=mirrored)
+    return translate("Cut {count}", count=count)
 
 
 def printed_size(size: str) -> str:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.core import FloatArray, InputError, nearest, size_words, thread_count
-from warpflat.pattern.drafting.cut_list import cloths_of, turned_over
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.label import Label, printed_size
 from warpflat.pattern.drafting.matched_lay import Stripes
@@ -307,10 +306,10 @@ def _copies(garment: DraftedGarment, fabric: str, sizes: Mapping[str, int]) -> l
         if count < 1:
             raise InputError(f"{count} garments of size {size}; it must be 1 or more")
         for piece in garment.pieces[size]:
-            quantity = cloths_of(piece).get(fabric, 0) if fabric else piece.piece.quantity
-            copies += [(piece, over) for over in turned_over(piece, quantity) * count]
+            quantity = piece.piece.cloths.get(fabric, 0) if fabric else piece.piece.quantity
+            copies += [(piece, over) for over in piece.piece.turned_over(quantity) * count]
     if not copies:
-        known = {cloth for pieces in garment.pieces.values() for piece in pieces for cloth in cloths_of(piece)}
+        known = {cloth for pieces in garment.pieces.values() for piece in pieces for cloth in piece.piece.cloths}
         raise InputError(f"no piece is of fabric {fabric!r}; {nearest(fabric, known)}")
     return copies
 
@@ -324,7 +323,7 @@ def _placed(piece: DraftedPiece, mirrored: bool, matrix: FloatArray, *, half: bo
     """Return a copy under a 2 by 3 matrix; a half one where it lies against the fold of the cloth."""
     moved = partial(mapped, matrix=matrix)
     cutouts = [cutout.cut_line for cutout in piece.cutouts.values()]
-    slits = [np.stack([b, b + notch.depth * notch.direction]) for notch in piece.notches for b in notch.base]
+    slits = [slit for notch in piece.notches for slit in notch.slits]
     for edge in () if half else piece.fold_edges:
         # A half on the fold is cut with its mirror image.
         cutouts, slits = ([*lines, *(mirror_image(line, edge.line) for line in lines)] for lines in (cutouts, slits))
@@ -379,9 +378,9 @@ def cloth_needed(garment: DraftedGarment) -> dict[str, dict[str, tuple[float | N
         for piece in pieces:
             outline = unfold_piece(piece)
             ways = shapely.Polygon(outline), shapely.Polygon(outline * [-1.0, 1.0])
-            for cloth, quantity in cloths_of(piece).items():
+            for cloth, quantity in piece.piece.cloths.items():
                 row = shapes.setdefault(cloth, {}).setdefault(size, [])
-                row.extend(ways[over] for over in turned_over(piece, quantity))
+                row.extend(ways[over] for over in piece.piece.turned_over(quantity))
     needed: dict[str, dict[str, tuple[float | None, ...]]] = {size: {} for size in garment.pieces}
     for cloth, by_size in shapes.items():
         own = {

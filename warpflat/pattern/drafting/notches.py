@@ -158,12 +158,9 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
         for fraction in fractions:
             for share in SHARES_FROM_START:
                 start = share * fraction * first.length
-                names = [
-                    line.piece_name(length).lower()
-                    for line, length in ((first, start), (second, opposite_length(seam, lines[number], 0, start)))
-                ]
-                back = any("back" in name for name in names) and not any("front" in name for name in names)
-                double = back if seam.double is None else seam.double
+                both = (first, start), (second, opposite_length(seam, lines[number], 0, start))
+                worn_at = [line.pieces[line.index(length)].piece.worn_at for line, length in both]
+                double = "back" in worn_at and "front" not in worn_at if seam.double is None else seam.double
                 if place_all(number, 0, start, double, 0.0 if seam.notches is not None else CLEAR):
                     break
         for own, other in ((0, 1), (1, 0)):
@@ -283,23 +280,18 @@ class SeamLine:
         """Return the edge at a length [m]."""
         return int(np.clip(np.searchsorted(self.joints, length, side="right") - 1, 0, len(self.lines) - 1))
 
-    def piece_name(self, length: float) -> str:
-        """Return the piece at a length [m]."""
-        return self.side[self.index(length)].piece
-
     @property
     def is_marked(self) -> bool:
         """Whether places along it are marked for joints of the other side.
 
         Not along panels, all of which would have the mark of one, nor along pleats, which are not laid yet.
         """
-        pleats = any("pleat fold" in name for piece in self.pieces for name in piece.piece.internal_lines)
-        return not pleats and not any(side.copy for side in self.side)
+        return not any(piece.piece.pleats for piece in self.pieces) and not any(side.copy for side in self.side)
 
     def fits_at(self, length: float) -> bool:
         """Return whether a length [m] means the same when pleats are laid: it does where one of them ends."""
         part = self.index(length)
-        count = sum(name.startswith("pleat fold") for name in self.pieces[part].piece.internal_lines)
+        count = self.pieces[part].piece.pleats
         stretch = self.edges[part].length / max(count, 1)
         local = length - float(self.joints[part])
         return count == 0 or abs(local - stretch * round(local / stretch)) <= MEET

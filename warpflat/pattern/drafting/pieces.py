@@ -104,6 +104,26 @@ class Piece:
         return self.quantity % 2 == 0 and (self.role == "pocket" or (self.paired and not self.on_fold))
 
     @property
+    def worn_at(self) -> str:
+        """Where it is worn: `at`, else "front" or "back" as its name has it; "" where neither says so."""
+        return self.at or next((side for side in ("front", "back") if side in self.name.lower()), "")
+
+    @property
+    def cloths(self) -> dict[str, int]:
+        """The cloths from which it is cut, and how often in all."""
+        return {self.fabric: 0, **self.also} | {self.fabric: self.quantity + self.also.get(self.fabric, 0)}
+
+    def turned_over(self, quantity: int) -> list[bool]:
+        """Return of each copy whether it is cut turned over: every second one of pairs."""
+        pairs = self.paired and not self.on_fold and quantity % 2 == 0
+        return [pairs and k % 2 == 1 for k in range(quantity)]
+
+    @property
+    def pleats(self) -> int:
+        """How many knife pleats are laid in it, each at a line on which it is folded."""
+        return sum(name.startswith("pleat fold") for name in self.internal_lines)
+
+    @property
     def printed_name(self) -> str:
         """What stands on paper; of a pair without its side."""
         name = self.name.replace("_", " ") if self.name.strip("_ ") else self.name

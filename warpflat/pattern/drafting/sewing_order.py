@@ -7,7 +7,6 @@ closes a ring, panels of one side of the body before its halves, and these befor
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
@@ -315,11 +314,8 @@ class _Workshop(SewingTasks):
                 # The second of both side seams closes a skirt, where nothing else is left that joins its front and back.
                 closes = closes or not any(joined(s) == here for t in self.tasks if t is not task for s in t.seams)
             centre = first[0] == second[0] or other_side(first[0]) == second[0]
-            faces = [
-                {"front", "back"} & set(re.split("[ _]", part[0])) or {self.pieces[part[0]].at}
-                for part in (first, second)
-            ]
-            differ = faces[0] != faces[1] and all(map(any, faces))
+            one, other = (self.pieces[part[0]].worn_at for part in (first, second))
+            differ = bool(one and other) and one != other
             return task.how["turn"], 5e-4 < abs(seam.ease) < GATHERED, closes, centre, differ
 
         def meet(one: Corner, other: Corner) -> bool:
@@ -401,9 +397,8 @@ class _Workshop(SewingTasks):
         if any(pieces[piece].quantity % 2 == 0 for piece, _ in places):
             # What is cut twice is drawn for one side, and sewn to both.
             places += [(piece, other_side(edge)) for piece, edge in places if pieces[piece].quantity == 1]
-        pleated = any("pleat fold" in name for piece in joined for name in piece.internal_lines)
         held = ""
-        if abs(seam.ease) >= 5e-4 and not pleated:
+        if abs(seam.ease) >= 5e-4 and not any(piece.pleats for piece in joined):
             share = seam.ease if seam.ease > 0 else 1.0 / (1.0 + seam.ease) - 1.0
             band = pieces[seam.sides[0 if seam.ease > 0 else 1][0].piece]
             stretched = band.role == "strip" or (share < _STRETCHED and self._is_ring(band))

@@ -375,7 +375,7 @@ class SewingTasks:
         """Add ruffles and hems of hoods; what their own seam to the garment leaves of strips, collars and facings goes with that."""
         ruffles = [name for name in self._with_role("strip") if self._has_hem(name)]
         self._add("ruffle_hem", ruffles, self._take_of(ruffles, ("hem",)))
-        pleated = [name for name in ruffles if any("pleat fold" in line for line in self.pieces[name].internal_lines)]
+        pleated = [name for name in ruffles if self.pieces[name].pleats]
         self._add("ruffle_pleats", pleated)
         longer = {s.piece for seam in self.seams if seam.ease > GATHERED for s in seam.sides[1]}
         self._add("ruffle_gathers", [name for name in ruffles if name in longer and name not in pleated])

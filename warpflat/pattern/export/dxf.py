@@ -22,13 +22,13 @@ from warpflat.core import (
     InputError,
     atomic_path,
     control_in,
+    find_unused_name,
     nearest,
     plain_letters,
     resample,
     source_date,
     turning_angles,
 )
-from warpflat.pattern.drafting.cut_list import cloths_of
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.label import text_width
 from warpflat.pattern.drafting.layout import lay_out, nests
@@ -86,20 +86,20 @@ def write_dxf(
     written = titles(list(dict.fromkeys(names.values())), lambda name: any(map(str.isalnum, _ascii(name))))
     for placed in lay_out(nests(garment, chosen)).placed:
         for piece in placed.pieces:
-            title = written[names[piece.name]]
+            title, cloths = written[names[piece.name]], piece.piece.cloths
             name = block_name(piece, taken, title)
             block = _lines(piece, scale, seams, dialect)
             # The system texts stand where the label has its room.
             texts = [
                 f"PIECE NAME: {title}",
                 f"SIZE: {piece.size}",
-                f"QUANTITY: {piece.piece.quantity}",
+                f"QUANTITY: {cloths[piece.piece.fabric]}",
                 f"CATEGORY: {'FOLD' if piece.piece.on_fold else 'PIECE'}",
-                f"FABRIC: {' / '.join(cloths_of(piece))}",
+                f"FABRIC: {' / '.join(cloths)}",
                 *(
                     "ANNOTATION: " + text.replace("\n", " ")
                     # How often it is cut, from each of its cloths.
-                    for text, _ in piece.label.lines[1 + bool(piece.size) :][: len(cloths_of(piece))]
+                    for text, _ in piece.label.lines[1 + bool(piece.size) :][: len(cloths)]
                 ),
             ]
             low, high = piece.label.box.min(axis=0), piece.label.box.max(axis=0)
@@ -206,10 +206,7 @@ def block_name(piece: DraftedPiece, taken: set[str], title: str = "") -> str:
     """
     text = f"{title or piece.name}_{piece.size}" if piece.size else title or piece.name
     clean = re.sub(r"[^A-Z0-9_$-]+", "_", _ascii(text).upper()).strip("_") or "PIECE"
-    unique, count = clean, 1
-    while unique in taken:
-        count += 1
-        unique = f"{clean}_{count}"
+    unique = find_unused_name(clean, taken, joint="_")
     taken.add(unique)
     return unique
 

@@ -30,6 +30,7 @@ __all__ = [
     "counted",
     "find_outlines",
     "left_out",
+    "read_grain",
     "read_quantity",
     "simple_ring",
 ]
@@ -170,6 +171,12 @@ def simple_ring(points: FloatArray, where: str) -> FloatArray:
             f"{where}: its outline crosses itself at ({1e3 * x:.1f}, {1e3 * y:.1f}) mm, beyond a corner; a piece has one outer line"
         )
     return np.asarray(parts[0].exterior.coords)[:-1]
+
+
+def read_grain(line: DrawnLine) -> FloatArray:
+    """Return the ends of a grain line, 2 by 2 [m], the lower one first: pieces are drawn as they are worn, whichever way it runs."""
+    ends = line.points[[0, -1]]
+    return ends[::-1] if ends[1, 1] < ends[0, 1] else ends
 
 
 def read_quantity(text: str) -> int:

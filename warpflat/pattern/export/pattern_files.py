@@ -168,10 +168,8 @@ def export_patterns(
             written, lost = _write(
                 drafted, folder, format, name=name, dialect=dialect, paper=paper, sizes=sizes, english=units == "in"
             )
-            files.append(written)
+            files += written
             notes += lost
-        if "dxf" in formats and len(drafted.pieces if sizes is None else sizes) > 1:
-            files.append(file_in(folder, name, ".rul").name)
     return [folder / file for file in files], notes
 
 
@@ -345,13 +343,11 @@ def write_pattern(
             for kind in FORMATS:
                 if kind in options.formats and not (kind == "pdf" and refused):
                     with optional_step(f"{FORMATS[kind].format(name)} was left out", folder=folder):
-                        file, lost = _write(
+                        written, lost = _write(
                             drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper
                         )
-                        files.append(file)
+                        files += written
                         notes = (*notes, *lost)
-                        if kind == "dxf" and len(drafted.pieces) > 1:
-                            files.append(file_in(folder, name, ".rul").name)
             if options.cloth is not None:
                 with optional_step("no marker was made", folder=folder) as not_made:
                     marked, remarks, plans = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
@@ -397,8 +393,8 @@ def _write(
     paper: str,
     sizes: Sequence[str] | None = None,
     english: bool = False,
-) -> tuple[str, tuple[str, ...]]:
-    """Write one file and return its name, and what the format leaves out."""
+) -> tuple[list[str], tuple[str, ...]]:
+    """Write one format and return the names of its files, and what it leaves out."""
     from warpflat.pattern.export.dxf import write_dxf
     from warpflat.pattern.export.garmentcode import write_garmentcode
     from warpflat.pattern.export.pattern_json import write_pattern_json
@@ -408,11 +404,14 @@ def _write(
 
     start, _, ending = FORMATS[kind].partition("{}")
     file = file_in(folder, start or name, ending) if "{}" in FORMATS[kind] else folder / start
-    lost: tuple[str, ...] = ()
+    files, lost = [file.name], tuple[str, ...]()
     report_activity(f"writing {file.name}")
     if kind == "dxf":
-        lengths = "english" if english else "metric"
-        write_dxf(drafted, file, dialect=dialect, units=lengths, sizes=sizes, rul=file_in(folder, name, ".rul"))
+        # Of several sizes the rules by which they are graded are a file of their own.
+        graded = len(drafted.pieces if sizes is None else sizes) > 1
+        rul = file_in(folder, name, ".rul") if graded else None
+        files += [] if rul is None else [rul.name]
+        write_dxf(drafted, file, dialect=dialect, units="english" if english else "metric", sizes=sizes, rul=rul)
     elif kind == "svg":
         write_svg(drafted, file, sizes=sizes)
     elif kind == "pdf":
@@ -425,7 +424,7 @@ def _write(
         lost = write_garmentcode(drafted, file, size=None if sizes is None else sizes[0])
     else:
         write_pattern_json(drafted, file)
-    return file.name, lost
+    return files, lost
 
 
 def _marker(
@@ -440,13 +439,14 @@ def _marker(
 
     Returns names, notes and the measures of each marker, or why there is none.
     """
-    from warpflat.pattern.drafting.cut_list import cloths_of
     from warpflat.pattern.drafting.marker import make_marker
     from warpflat.pattern.drafting.matched_lay import Stripes
     from warpflat.pattern.export.svg import write_marker_svg
 
     report_activity(f"laying the marker, {seconds} s at most")
-    cloths = list(dict.fromkeys(each for row in drafted.pieces.values() for piece in row for each in cloths_of(piece)))
+    cloths = list(
+        dict.fromkeys(each for row in drafted.pieces.values() for piece in row for each in piece.piece.cloths)
+    )
     names, remarks, plans = list[str](), list[str](), list[dict[str, Any]]()
     for number, fabric in enumerate(cloths):
         own = cloth if number == 0 else replace(cloth, stripes=Stripes())
@@ -490,7 +490,7 @@ def _marker(
             copy.piece.name
             for copy in marker.placements
             if marker.folded and not copy.piece.piece.on_fold
-            if cloths_of(copy.piece)[fabric] * (1 if sizes is None else sizes[copy.piece.size]) % 2
+            if copy.piece.piece.cloths[fabric] * (1 if sizes is None else sizes[copy.piece.size]) % 2
         ]
         if spare:
             remarks.append(f"marker{of}: the cloth lies double: {', '.join(dict.fromkeys(spare))} cut once too often")

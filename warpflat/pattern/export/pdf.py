@@ -128,11 +128,16 @@ def draw_sheet(printed: DraftedGarment, paper: str) -> tuple[Tiling, list[tuple[
                 pieces = _beside_on_one_sheet(place, others, tiling)
         placed.append(replace(place, pieces=tuple(_upright(piece, place.matrix) for piece in pieces)))
     tiling, letters = replace(tiling, sheet=replace(sheet, placed=tuple(placed))), seam_letters(printed)
+    sewn: dict[tuple[str, str], list[str]] = {}
+    for seam in printed.garment.seams:
+        for side in seam.stretches:
+            sewn.setdefault(side.place, []).append(seam.name)
     drawings = []
     for place in placed:
         joints = [place.on_piece(joint) for joint in tiling.joints]
         outside = shapely.transform(tiling.outside, place.on_piece)
-        drawings.append(draw_nest(place.pieces, OnPaper(joints=joints, outside=outside, letters=letters)))
+        shown = OnPaper(joints=joints, outside=outside, letters=letters, sewn=sewn)
+        drawings.append(draw_nest(place.pieces, shown))
     return tiling, drawings
 
 
@@ -329,13 +334,7 @@ def sheet_names(tiling: Tiling, drawings: Sequence[tuple[Drawing, ...]]) -> dict
     lines, words = [], []
     for placed, sizes in zip(tiling.sheet.placed, drawings, strict=True):
         for drawing in sizes:
-            lines += [
-                shapely.LineString(
-                    placed.on_sheet(np.vstack([each.points, each.points[:1]] if each.closed else [each.points]))
-                )
-                for each in drawing.strokes
-                if not each.hidden
-            ]
+            lines += [shapely.LineString(placed.on_sheet(each.path)) for each in drawing.strokes if not each.hidden]
             words += [shapely.Polygon(placed.on_sheet(each.box())) for each in drawing.words]
     taken = shapely.STRtree([*lines, *words])
     height, found = SHEET_NAME * CAPITALS / POINT, {}

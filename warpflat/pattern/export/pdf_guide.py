@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core import FloatArray, energy_words, without_side
-from warpflat.pattern.drafting.cut_list import cloths_of, cut_list
+from warpflat.pattern.drafting.cut_list import cut_list
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.finished import finished_lengths
 from warpflat.pattern.drafting.label import CAPITALS, allowances_of, cutting_words, printed_size, wrap_text
@@ -162,7 +162,9 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     if steps:
         page.heading(translate("Sewing order"), 3 * LINE + STEP_HEIGHT)
         page.paragraph(
-            translate("Right sides together. Letters stand beside the notches; notches with the same letter meet.")
+            translate(
+                "Right sides together. Letters stand beside the notches, and on edges without any; notches with the same letter meet."
+            )
             + " "
             + translate("Press each seam when it is sewn, and neaten edges that stay open inside.")
         )
@@ -201,11 +203,11 @@ def _pieces_to_cut(page: _Page, pieces: Sequence[DraftedPiece]) -> None:
         for number, piece in enumerate(pieces[start : start + in_row]):
             left = page.left + number * step
             _thumbnail(page.canvas, piece, np.array([left + 0.5 * step, top - THUMBNAIL[1] / 2]), scale)
-            cloths = " / ".join(map(translate_name, cloths_of(piece)))
+            cloths = piece.piece.cloths
+            how = cutting_words(piece.piece, cloths[piece.piece.fabric])
             page.y = top - THUMBNAIL[1] - LINE
-            for k, line in enumerate(
-                (f"{start + number + 1}  {titles[piece.name]}", cutting_words(piece.piece), cloths)
-            ):
+            named = f"{start + number + 1}  {titles[piece.name]}", how, " / ".join(map(translate_name, cloths))
+            for k, line in enumerate(named):
                 page.text(left + 0.001, line, 7.5, bold=k == 0, width=step - 0.002)
                 page.y -= 0.0038
 

@@ -44,8 +44,7 @@ def write_plt(garment: DraftedGarment, path: str | os.PathLike[str], *, sizes: S
             drawings = draw_nest(placed.pieces)
         for drawing in drawings:
             for stroke in (stroke for stroke in drawing.strokes if not stroke.hidden):
-                line = stroke.points if stroke.curve is None else stroke.curve.sample(0.5 / UNITS_IN_METRE)
-                line = np.vstack([line, line[:1]]) if stroke.closed else line
+                line = stroke.path if stroke.curve is None else stroke.curve.sample(0.5 / UNITS_IN_METRE)
                 # Pen up to its first point, down along the others.
                 units = np.rint(UNITS_IN_METRE * placed.on_sheet(line)).astype(np.int64)
                 moved = np.concatenate([[True], (np.diff(units, axis=0) != 0).any(axis=1)])

@@ -36,6 +36,7 @@ from warpflat.pattern.export.outlines import (
     counted,
     find_outlines,
     left_out,
+    read_grain,
     read_quantity,
     simple_ring,
 )
@@ -294,9 +295,7 @@ def _pieces(
         ends_at_tip = any(np.linalg.norm(points[end] - tip) < 1e-6 for tip in tips.values() for end in (0, -1))
         if kind == "seam" and ends_at_tip:
             parts[number] = edge, "dart", points
-    grain = next((line.points[[0, -1]] for line in block.lines.get(_GRAIN, []) if not line.closed), None)
-    if grain is not None and grain[1, 1] < grain[0, 1]:
-        grain = grain[::-1]
+    grain = next((read_grain(line) for line in block.lines.get(_GRAIN, []) if not line.closed), None)
     found, darts, eyes, cloths = list[list[Edge]](), list[Dart](), list[Hole](), [block.value("FABRIC")]
     inner = block.lines.get(_INNER, [])
     if parts:

@@ -35,6 +35,7 @@ from warpflat.pattern.export.outlines import (
     by_size,
     counted,
     find_outlines,
+    read_grain,
     read_quantity,
 )
 
@@ -145,7 +146,7 @@ def _own_piece(
             continue
         line = drawing.lines(element, _times(matrix, _transform(element.get("transform", ""))))[0]
         if role == "grain":
-            grain = line.points[[0, -1]]
+            grain = read_grain(line)
         elif role == "cut":
             cutting.append(line.path)
         elif role in _KINDS and edge:
@@ -199,9 +200,9 @@ def _freesewing_pieces(drawing: _Drawing, page: FloatArray, where: str) -> tuple
                 elif "sa" in kinds:
                     cutting.append(line.path)
                 elif "cutonfold" in marked:
-                    grain = fold = line.points[[0, -1]]
+                    grain = fold = read_grain(line)
                 elif "grainline" in marked:
-                    grain = line.points[[0, -1]]
+                    grain = read_grain(line)
         if not sewing:
             continue
         # A stack is called after its design and its part, "aaron.front".

@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from warpflat.core import FloatArray, atomic_path, control_in, format_count, size_words
+from warpflat.core import FloatArray, atomic_path, control_in, find_unused_name, format_count, size_words
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.drawing import Drawing, Stroke, draw_nest, grain_strokes
 from warpflat.pattern.drafting.label import CAPITALS, LEADING, Words, text_width
@@ -135,7 +135,11 @@ class SvgPage:
         """Add a group for one piece and size, moved by a 2 by 3 matrix [m]; `seams` are the words at its edges."""
         piece = drawing.piece
         key = self._id(f"{piece.name}-{piece.size}" if piece.size else piece.name)
-        about = {"data-piece": piece.name, "data-size": piece.size, "data-quantity": str(piece.piece.quantity)}
+        about = {
+            "data-piece": piece.name,
+            "data-size": piece.size,
+            "data-quantity": str(piece.piece.cloths[piece.piece.fabric]),
+        }
         group = ET.SubElement(self.root, "g", {"id": key, **about})
         colour = None if hue is None else SIZE_COLOURS[hue % len(SIZE_COLOURS)]
         raw = {edge.name for edge in piece.edges if edge.kind == "cut"}
@@ -235,10 +239,7 @@ class SvgPage:
         """Return a valid id that no other element has."""
         clean = re.sub(r"[^\w.\-]", "_", name)
         clean = clean if re.match(r"[^\W\d]", clean) else f"_{clean}"
-        unique, count = clean, 1
-        while unique in self._ids:
-            count += 1
-            unique = f"{clean}_{count}"
+        unique = find_unused_name(clean, self._ids, joint="_")
         self._ids.add(unique)
         return unique
 

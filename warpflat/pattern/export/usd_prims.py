@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpflat.core import CannotWriteError, FloatArray, IntArray, atomic_path
+from warpflat.core import CannotWriteError, FloatArray, IntArray, atomic_path, find_unused_name
 from warpflat.flat import Surface
 from warpflat.pattern.export.geometry import Polylines
 
@@ -99,12 +99,9 @@ def valid_name(name: str, taken: set[str]) -> str:
     """Return `name` as a USD identifier that is not in `taken`, to which it is added."""
     from pxr import Tf
 
-    base = Tf.MakeValidIdentifier(name)
-    result, number = base, 2
-    while result in taken:
-        result, number = f"{base}_{number}", number + 1
-    taken.add(result)
-    return result
+    unique = find_unused_name(Tf.MakeValidIdentifier(name), taken, joint="_")
+    taken.add(unique)
+    return unique
 
 
 def part_path(piece: str, kind: str) -> str:
