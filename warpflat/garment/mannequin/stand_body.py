@@ -140,9 +140,9 @@ def _bending() -> csr_array:
     """Return the matrix of the squared second differences over the finer body's edges."""
     from scipy.sparse import diags_array
 
-    plain, edges = model_places().plain, mesh_edges(finer_body()[1])
-    even = diags_array(np.ones(len(plain))) - neighbour_mean(edges, len(plain))
-    stiff = np.where(plain, 1.0, _DETAIL)
+    matrix, triangles = finer_body()
+    even = diags_array(np.ones(matrix.shape[0])) - neighbour_mean(mesh_edges(triangles), matrix.shape[0])
+    stiff = np.where(matrix @ BodyModel.load().detail > 0.5, _DETAIL, 1.0)
     return (even.T @ diags_array(stiff) @ even).tocsr()
 
 
