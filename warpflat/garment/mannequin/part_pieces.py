@@ -97,7 +97,7 @@ def princess_seams(layout: Layout, bricks: Sequence[str], piece: str) -> list[Fo
 def _parts(
     layout: Layout, vertices: FloatArray, name: str, recipe: PieceRecipe, lines: Sequence[str]
 ) -> dict[str, PieceRecipe]:
-    """Return the parts of a piece, named by where they lie.
+    """Return the parts of a piece, named by where they lie, those of the centre first.
 
     Raises:
         InputError: the lines do not part it.
@@ -130,7 +130,7 @@ def _parts(
         at = alike.index(number)
         place = "" if len(alike) == 1 else ("lower", "upper")[at] if len(alike) == 2 else f"{at + 1}"
         names.append("_".join(part for part in (word, place) if part))
-    for part, ending in zip(groups, names, strict=True):
+    for part, ending in sorted(zip(groups, names, strict=True), key=lambda each: not each[1].startswith("centre")):
         found[f"{name}_{ending}"] = part_recipe(layout, recipe, part, lines)
     return found
 
