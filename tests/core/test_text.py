@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from warpflat.core.text import LONGEST_LINE, LONGEST_WORD, line_name, one_line
+from warpflat.core.text import LONGEST_LINE, LONGEST_WORD, dart_words, line_name, one_line
 
 
 def test_a_long_word_and_a_long_line_lose_their_middle() -> None:
@@ -31,3 +31,12 @@ def test_lines_are_joined_and_control_characters_escaped() -> None:
 )
 def test_a_number_that_is_a_word_of_its_own_is_no_part_of_a_line_name(name: str, line: str):
     assert line_name(name) == line
+
+
+def test_a_dart_is_called_so_once() -> None:
+    assert [dart_words(name) for name in ("waist dart left", "bust_dart", "bust", "cut 2")] == [
+        "waist dart left",
+        "bust_dart",
+        "dart bust",
+        "dart cut 2",
+    ]

@@ -19,6 +19,7 @@ from .errors import StepError as StepError
 from .errors import expect as expect
 from .errors import expect_callback as expect_callback
 from .errors import expect_each as expect_each
+from .errors import expect_within as expect_within
 from .errors import is_number as is_number
 from .errors import nearest as nearest
 from .errors import system_reason as system_reason
@@ -92,6 +93,7 @@ from .text import MADE_TO_MEASURE as MADE_TO_MEASURE
 from .text import aligned as aligned
 from .text import area_words as area_words
 from .text import control_in as control_in
+from .text import dart_words as dart_words
 from .text import energy_words as energy_words
 from .text import find_unused_name as find_unused_name
 from .text import format_count as format_count

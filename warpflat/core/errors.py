@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import numbers
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from typing import TypeGuard
 
 from warpflat.core.text import one_line, quote_value
@@ -17,6 +17,7 @@ __all__ = [
     "expect",
     "expect_callback",
     "expect_each",
+    "expect_within",
     "is_number",
     "nearest",
     "system_reason",
@@ -103,6 +104,24 @@ def expect_callback(callback: object) -> None:
 def is_number(value: object, *, whole: bool = False) -> TypeGuard[float]:
     """Return whether a value is a number of Python or NumPy, or a whole one if asked; True and False are not."""
     return isinstance(value, numbers.Integral if whole else numbers.Real) and not isinstance(value, bool)
+
+
+def expect_within(options: object, bounds: Mapping[str, tuple[float, float]], what: str) -> None:
+    """Raise InputError unless attributes lie within their bounds; one whose default is a whole number must be one.
+
+    Args:
+        options: of a class whose attributes have defaults.
+        bounds: by attribute, its least and its largest value.
+        what: the word before its name, as "relax".
+
+    Raises:
+        InputError: one does not.
+    """
+    for name, (lowest, highest) in bounds.items():
+        value, whole = getattr(options, name), isinstance(getattr(type(options), name), int)
+        if not is_number(value, whole=whole) or not lowest <= value <= highest:
+            kind = "whole number" if whole else "number"
+            raise InputError(f"{what}: {name} = {value!r}; must be a {kind} between {lowest:g} and {highest:g}")
 
 
 def nearest(word: str, valid: Iterable[str]) -> str:

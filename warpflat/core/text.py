@@ -10,6 +10,7 @@ __all__ = [
     "MADE_TO_MEASURE",
     "aligned",
     "control_in",
+    "dart_words",
     "find_unused_name",
     "format_count",
     "line_name",
@@ -55,6 +56,11 @@ def without_side(name: str) -> str:
     """Return a name without its side, left or right: the shoulder of "shoulder left"; underscores become spaces."""
     words = name.replace("_", " ").split(" ")
     return " ".join(word for word in words if word not in ("left", "right")) or name
+
+
+def dart_words(name: str) -> str:
+    """Return what a dart is called: "waist dart left", "dart bust"; the word is said once."""
+    return name if "dart" in without_side(name).split(" ") else f"dart {name}"
 
 
 def line_name(name: str) -> str:

@@ -34,6 +34,7 @@ from warpflat.app.scene.run import files_of_run
 from warpflat.core.errors import InputError
 from warpflat.core.toml_file import read_toml
 from warpflat.flat.surface.io.read import METRES_PER_UNIT
+from warpflat.garment.draping.write import files_of_drape
 from warpflat.garment.mannequin.body_model import BodyModel
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -304,3 +305,10 @@ def test_no_command_of_a_page_escapes_the_test_above(page: Path) -> None:
                 parse(words)
     languages = {block.language for block in blocks(page)}
     assert languages <= {"sh", "python", "toml", "", "{eval-rst}", "{literalinclude}", "{toctree}"}
+
+
+def test_the_page_and_the_help_of_a_drape_name_all_its_files():
+    page, told = (ROOT / "docs/drape.md").read_text(encoding="utf-8"), cli.commands["drape"].epilog or ""
+    for file in files_of_drape(["NAME"], picture=True, frames=True, usd=True):
+        assert f"`{file}`" in page
+        assert file in told

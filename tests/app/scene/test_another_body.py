@@ -84,9 +84,13 @@ def test_a_skirt_is_fitted_to_another_size(command: Command):
     assert np.array_equal(before.raw.polygons, after.raw.polygons)
     files = metrics["files"]["skirt"]
     assert {"skirt.fitted.obj", "skirt.body.obj", "pattern.json"} <= set(files)
-    # A second time it replaces what it has written.
-    again = command("fit", "skirt.obj", "--units", "m", "--from", "EU 36", "--to", "EU 42", "--out", "fitted", *BARE)
+    # A second time it replaces what it has written; its page lists all files.
+    shown = ("--frames", "0", "--quiet")
+    again = command("fit", "skirt.obj", "--units", "m", "--from", "EU 36", "--to", "EU 42", "--out", "fitted", *shown)
     assert (again.code, again.err) == (0, "")
+    page = Path("fitted/review.html").read_text(encoding="utf-8")
+    for file in json.loads(Path("fitted/metrics.json").read_text(encoding="utf-8"))["files"]["skirt"]:
+        assert file == "review.html" or f'href="{file}"' in page
 
 
 def test_a_known_pattern_is_graded_and_keeps_its_grain(tmp_path: Path):

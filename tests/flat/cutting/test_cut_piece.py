@@ -437,6 +437,8 @@ def test_the_ledger_ranks_candidates_by_what_they_release(bodice: Flattening):
     assert x[0] == pytest.approx(-x[1], abs=1e-9)
     ledger = make_ledger(bodice)
     assert "bust" in ledger.peaks[0]
+    # Two that mirror each other are told apart by the next line.
+    assert len(set(ledger.peaks)) == len(ledger.peaks)
     assert len(repr(ledger)) < 200
     assert max(len(repr(entry)) for entry in ledger.entries) < 800
     per_cm = [entry.per_cm for entry in ledger.entries]

@@ -362,8 +362,8 @@ def test_a_start_of_another_mesh_is_refused():
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        ({"max_steps": 1.5}, "max_steps = 1.5 is not a whole number"),
-        ({"check_every": 2.5}, "check_every = 2.5 is not a whole number"),
+        ({"max_steps": 1.5}, "max_steps = 1.5; must be a whole number between 1 and"),
+        ({"check_every": 2.5}, "check_every = 2.5; must be a whole number between 1 and"),
         ({"kinetic_damping": "no"}, "kinetic_damping = 'no' is neither True nor False"),
     ],
 )

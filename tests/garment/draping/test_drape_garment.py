@@ -7,6 +7,7 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,8 @@ from scipy.spatial import Delaunay
 from surface_meshes import cylinder, grid
 
 import warpflat
+from warpflat.app.cli.fit_lines import fit_lines
+from warpflat.app.cli.tables import drape_lines
 from warpflat.app.review.faults import faults_of
 from warpflat.app.scene.drape import drape_scene
 from warpflat.app.scene.load import load_scene
@@ -24,6 +27,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.flat.fabric.fabric import grain_axes
 from warpflat.flat.fabric.library import find_fabric, load_library
+from warpflat.flat.flattening.verdict import judge
 from warpflat.flat.model.membrane import make_cloth
 from warpflat.flat.surface.connectivity import border_loops
 from warpflat.flat.surface.paths.lines import with_lines
@@ -95,7 +99,7 @@ def test_cloth_gapes_at_its_edges_and_stands_off_inside(worn: warpflat.Drape):
     away = np.linalg.norm(cloth.designed[:, None] - cloth.designed[borders], axis=2).min(axis=1)
     for vertex, words in (
         (int(away.argmax()), "stands off 20.0 mm from the designed surface,"),
-        (int(borders[0]), "gapes by 20.0 mm"),
+        (int(borders[0]), "gapes by 25.0 mm, 20.0 mm of it misfit, over"),
     ):
         near = np.linalg.norm(cloth.designed - cloth.designed[vertex], axis=1) < 0.05
         lift, none = np.where(near, 0.02, 0.0), np.zeros(len(near))
@@ -106,12 +110,41 @@ def test_cloth_gapes_at_its_edges_and_stands_off_inside(worn: warpflat.Drape):
             meant_to_touch=near,
             bridged=none,
             lift=lift,
-            gap=lift,
+            # Cloth that was designed 5 mm off the body.
+            gap=lift + 0.005,
             strains=no_strains(cloth.faces),
             gathered=near & False,
             compared_with="designed surface",
         )
         assert words in place.words
+
+
+def test_a_place_at_a_dart_is_called_by_the_dart(worn: warpflat.Drape):
+    """Its legs are edges, "waist dart left.left" and "waist dart left.right"."""
+    leg, none = next(iter(worn.cloth.lines.values())), np.zeros(len(worn.cloth.designed))
+    cloth = dataclasses.replace(worn.cloth, lines={"front.waist dart left.left": leg})
+    near = np.linalg.norm(cloth.designed - cloth.designed[leg[1]], axis=1) < 0.05
+    misfit = np.where(near, 0.02, 0.0)
+    (place,) = find_places(
+        cloth, worn.areas, misfit=misfit, meant_to_touch=near, bridged=none, lift=-misfit, gap=none, strains=no_strains(cloth.faces),
+        gathered=near & False, compared_with="designed surface",
+    )  # fmt: skip
+    assert place.words.startswith("front near waist dart left falls in")
+
+
+def test_a_place_is_told_once():
+    """The verdict tells the five worst."""
+    words = [f"the cloth stands off {number} mm" for number in range(6)]
+    drape = {
+        "converged": True, "compared_with": "body", "distance_m": {"mean": 0.002}, "misfit_m": {"mean": 0.001, "p95": 0.002, "max": 0.003},
+        "places": [{"kind": "misfit", "fails": False, "words": each} for each in words],
+    }  # fmt: skip
+    metrics: dict[str, Any] = {"pieces": {}, "drape": drape}
+    verdict = judge(metrics)
+    assert verdict is not None
+    metrics["verdict"] = verdict.as_dict()
+    lines = [*fit_lines(metrics), *drape_lines(metrics)]
+    assert [sum(each in line for line in lines) for each in words] == [1] * 6
 
 
 def test_a_place_that_goes_on_into_another_piece_names_both(worn: warpflat.Drape):

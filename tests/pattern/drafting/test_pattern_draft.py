@@ -157,6 +157,14 @@ def test_the_back_is_double_the_front_is_single(dress):
     assert not any(n.double for n in pieces["back bodice"].notches if n.seam == "side")
 
 
+@pytest.mark.parametrize("lean", [-0.04, 0.0, 0.04])
+def test_words_on_a_fold_are_read_upwards_as_all_words_along_steep_lines(lean: float) -> None:
+    corners = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.4), (lean, 0.4)]
+    half = polygon("half", corners, kinds=("seam", "seam", "seam", "fold"), grain=np.array([(0.1, 0.1), (0.1, 0.3)]))
+    (said,) = [words for words in draw_piece(draft_piece(half)).words if words.text == "PLACE ON FOLD"]
+    assert np.degrees(said.angle) == pytest.approx(90.0, abs=6.0)
+
+
 @pytest.mark.parametrize("at", ["back", ""])
 def test_a_back_is_told_by_where_it_is_worn_as_by_its_name(at: str) -> None:
     """A panel of GarmentCode says where it hangs: its name need not."""
@@ -340,7 +348,9 @@ def curved_dart(mouth, bends=(0.08, 0.08), length=0.1):
 def test_a_dart_without_room_for_its_allowances_is_folded_along_its_middle(mouth, bends):
     piece = curved_dart(mouth, bends)
     (dart,) = piece.darts
-    assert any(f"is folded, not cut away: its mouth of {length_words(mouth)} has" in note for note in piece.notes)
+    assert any(
+        f"dart d is folded, not cut away: its mouth of {length_words(mouth)} has" in note for note in piece.notes
+    )
     assert {(n.edge, n.seam) for n in piece.notches} == {("l", "d"), ("r", "d")}
     wedge = shapely.Polygon(np.concatenate([piece.edge("l").line, piece.edge("r").line[1:]]))
     cut = shapely.Polygon(piece.cut_line)

@@ -59,6 +59,7 @@ def test_pattern_json_keeps_how_seams_are_sewn_and_notched_and_the_notes():
 @BOTH
 def test_allowances_are_those_that_are_drawn(ending: str, tmp_path: Path):
     (piece,) = through(darted(), ending, tmp_path).pieces[""]
+    assert [dart.name for dart in piece.darts] == ["d"]
     assert {edge.name: edge.width for edge in piece.edges} == pytest.approx(
         {name: width or 0.0 for name, width in zip(NAMES, WIDTHS, strict=True)}
     )
@@ -75,7 +76,7 @@ def test_hems_and_raw_edges_stay_what_they_are(ending: str, tmp_path: Path):
 def test_a_pleat_is_sewn_as_far_as_before(ending: str, tmp_path: Path):
     (piece,) = through(darted(pleat=0.04), ending, tmp_path).pieces[""]
     (dart,) = piece.darts
-    assert (dart.left, dart.right) == ("d.left", "d.right")
+    assert (dart.name, dart.left, dart.right) == ("d", "d.left", "d.right")
     assert dart.pleat == pytest.approx(0.04, abs=1e-6)
     assert piece.edge("d.left").length == pytest.approx(np.hypot(0.02, 0.12), abs=1e-6)
 

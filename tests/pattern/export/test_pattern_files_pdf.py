@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import shapely
 from PIL import Image
-from polygons import corners_of, polygon, sewn
+from polygons import corners_of, drafted, polygon, sewn
 from pypdf import PdfReader
 
 from warpflat.core.errors import InputError
@@ -20,7 +20,7 @@ from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.half_pieces import halved
 from warpflat.pattern.drafting.pieces import Pattern
 from warpflat.pattern.drafting.sewing_order import seam_letters
-from warpflat.pattern.export.pdf import PAPERS, draw_sheet, write_pdf
+from warpflat.pattern.export.pdf import PAPERS, draw_sheet, too_many_sheets, write_pdf
 from warpflat.pattern.export.pdf_legend import TEST_INCHES, TEST_MM
 from warpflat.pattern.export.pdf_tiling import LEGEND_SIZE
 from warpflat.pattern.export.svg import SIZE_COLOURS, write_svg
@@ -284,3 +284,10 @@ def test_every_seam_has_its_letter_on_the_sheets():
     _, drawings = draw_sheet(halved(garment), "A4")
     for (drawing,) in drawings:
         assert letters <= {words.text for words in drawing.words}
+
+
+def test_sheets_are_counted_as_they_are_printed() -> None:
+    """A run and an export refuse the same patterns: of a piece on the fold half is printed."""
+    whole = drafted(polygon("awning", corners_of(10.0, 6.0)))
+    assert [too_many_sheets(each, "A4") for each in (whole, halved(whole))] == ["", ""]
+    assert "sheets" in too_many_sheets(drafted(polygon("tent", corners_of(20.0, 6.0))), "A4")

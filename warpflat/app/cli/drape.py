@@ -80,6 +80,7 @@ def drape(
     """
     from dataclasses import replace
 
+    from warpflat.app.cli.fit_lines import fit_lines
     from warpflat.app.cli.summary import summary_lines
     from warpflat.app.cli.tables import drape_lines
     from warpflat.app.review.faults import faults_of
@@ -107,13 +108,13 @@ def drape(
         left = [f"note: {note}" for note in result.notes if note not in result.metrics.get("notes", ())]
         for line in (*(left if output.tells else ()), *warnings):
             tell(line)
-        output.report(
-            folder / "metrics.json",
-            lambda: [
-                *summary_lines(result.metrics, result.files, str(folder)),
-                *(drape_lines(result.metrics) if output.verbose else ()),
-            ],
-        )
+
+        def words() -> list[str]:
+            lines = summary_lines(result.metrics, result.files, str(folder))
+            # The folder comes last.
+            return [lines[-1], *fit_lines(result.metrics), *drape_lines(result.metrics)] if output.verbose else lines
+
+        output.report(folder / "metrics.json", words)
         return FAULTY if warnings else DONE
     of_pattern = {"units": units, "body": body, "fabric": fabric, "seams": seams, "size": size, "edges": edges or None}
     for option, value in of_pattern.items():

@@ -72,7 +72,7 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
         ]
         tables.append(aligned(columns, seams, left=(0, 1)))
     if found := metrics.get("garment", {}).get("found_seams"):
-        # What closing each seam would cost, per centimetre that is sewn.
+        # What closing each seam would cost, per centimetre of the garment as it is worn.
         prices = [
             (
                 seam["name"],
@@ -84,7 +84,7 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
             )
             for seam in found
         ]
-        tables.append(aligned(("found seam", "sewn", "releases", "per cm"), prices))
+        tables.append(aligned(("found seam", "as worn", "releases", "per cm"), prices))
     if metrics.get("constraints"):
         held = [
             (each["name"], f"{each['amiss_mm']:.2f} mm", _price(each["price_j"])) for each in metrics["constraints"]
@@ -129,7 +129,7 @@ def _price(joules: float | None) -> str:
 
 
 def drape_lines(metrics: Mapping[str, Any]) -> list[str]:
-    """Return what a drape has found, a sentence a line; none without one."""
+    """Return what a drape has found, a sentence a line; none without one. Places that the verdict tells stand there."""
     if "drape" not in metrics:
         return []
     drape = metrics["drape"]
@@ -138,7 +138,8 @@ def drape_lines(metrics: Mapping[str, Any]) -> list[str]:
         f"worn {1e3 * distance['mean']:.2f} mm from the {drape['compared_with']}, "
         f"of which {1e3 * misfit['mean']:.2f} mm is misfit (95 %: {1e3 * misfit['p95']:.1f}, at most {1e3 * misfit['max']:.1f} mm)"
     )
-    return [first, *(f"  {place['words']}" for place in drape["places"])]
+    told = {finding["words"] for finding in metrics["verdict"]["findings"]}
+    return [first, *(f"  {place['words']}" for place in drape["places"] if place["words"] not in told)]
 
 
 def mannequin_table(source: str, levels: Mapping[str, Level], difference: SizeDifference | None = None) -> str:

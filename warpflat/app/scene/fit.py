@@ -449,7 +449,7 @@ def fit_to(
                     own["seams_cut"] = job.carry_cuts(carried, tables["seams_cut"])
                 scene = make_scene(own, name=name, folder=Path(), where=COMMAND_LINE)
                 with output_folder(out, [*files_of_run(scene), *meshes], sources=job.sources, guard=True) as to:
-                    result = run_scene(scene, out, device=device, on_progress=on_progress)
+                    result = run_scene(scene, out, device=device, on_progress=on_progress, further=list(meshes))
                     for file, text in meshes.items():
                         with atomic_path(to / file) as path:
                             path.write_text(text, encoding="utf-8")

@@ -75,6 +75,7 @@ def run_scene(
     device: str | None = None,
     cuts: CutSequence | None = None,
     built: Callable[[], tuple[Mannequin, FormResult]] | None = None,
+    further: Sequence[str] = (),
 ) -> SceneResult:
     """Flatten the scene's surface, all pieces of its file, or the pieces of its form, and write the result.
 
@@ -90,6 +91,7 @@ def run_scene(
         device: Warp device, before the scene's own.
         cuts: of a surface, to be made instead of the scene's own (see `warpflat.app.scene.ledger.cuts_of_entry`).
         built: gives the scene's mannequin and form, where they are built already.
+        further: files that the caller adds to the folder, which the page lists, too.
 
     Raises:
         InputError: the surface, a line, a cut, the fabric or a setting is wrong, `out` cannot be written, or a file there that the scene
@@ -102,7 +104,7 @@ def run_scene(
         def made(one: Scene) -> SceneResult:
             form = built() if built is not None and one is scene else None
             plan = plan_scene(one, device=device, cuts=cuts, built=form)
-            return _run(plan, folder, on_progress=on_progress, device=device)
+            return _run(plan, folder, on_progress=on_progress, device=device, further=further)
 
         _, result, closed = with_open_darts(settled, made)
         return replace(result, notes=(*notes, *closed, *result.notes))
@@ -137,6 +139,7 @@ def _run(
     *,
     on_progress: Callable[[Progress], bool | None] | None,
     device: str | None,
+    further: Sequence[str],
 ) -> SceneResult:
     """Flatten a garment and write its files into a folder that an `output_folder` holds; pictures and pattern beside the film.
 
@@ -219,7 +222,7 @@ def _run(
                 write_review(
                     folder,
                     measured | notes_left_out(folder),
-                    tuple(files),
+                    (*files, *further),
                     name=scene.name,
                     film=packed,
                     pictures=shown,

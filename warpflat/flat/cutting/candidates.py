@@ -148,8 +148,14 @@ def find_candidates(result: Flattening, places: Sequence[int] | None = None) -> 
 
 
 def peaks_in_words(result: Flattening) -> tuple[str, ...]:
-    """Return the places of the peaks of a piece's energy as sentences, highest first."""
-    return tuple(place_in_words(result.surface, vertex) for vertex in find_peaks(result))
+    """Return the places of the peaks of a piece's energy as sentences, highest first; of two that mirror each other by a line more."""
+    surface, peaks = result.surface, find_peaks(result)
+    words = [place_in_words(surface, vertex) for vertex in peaks]
+    for lines in range(3, len(surface.lines) + 1):
+        alike = [number for number, place in enumerate(words) if words.count(place) > 1]
+        for number in alike:
+            words[number] = place_in_words(surface, peaks[number], lines=lines)
+    return tuple(words)
 
 
 def _diagonal(surface: Surface) -> float:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
-from warpflat.core.errors import InputError, expect, is_number, nearest
+from warpflat.core.errors import InputError, expect, expect_within, nearest
 
 __all__ = ["SOLVERS", "RelaxOptions", "Solver", "coarse_options", "given_options"]
 
@@ -55,27 +55,16 @@ class RelaxOptions:
     gap_mm: float = 0.5
     contact_share: float = 0.05
 
+    #: Least and largest value of each.
+    BOUNDS: ClassVar[Mapping[str, tuple[float, float]]] = {
+        "time_step": (1e-9, 1e9), "first_steps_gain": (0, 1), "energy_left": (0, 1), "outline_left_mm": (0, 1e3),
+        "energy_tolerance": (0, 1), "residual_tolerance": (1e-12, 1e3), "max_steps": (1, 10**9), "check_every": (1, 10**6),
+        "gap_mm": (0, 1e3), "contact_share": (0, 1e6),
+    }  # fmt: skip
+
     def validate(self) -> None:
         """Raise InputError, with its name, for a value out of its bounds."""
-        for key, low, high in (
-            ("time_step", 1e-9, 1e9),
-            ("first_steps_gain", 0.0, 1.0),
-            ("energy_left", 0.0, 1.0),
-            ("outline_left_mm", 0.0, 1e3),
-            ("energy_tolerance", 0.0, 1.0),
-            ("residual_tolerance", 1e-12, 1e3),
-            ("max_steps", 1, 10**9),
-            ("check_every", 1, 10**6),
-            ("gap_mm", 0.0, 1e3),
-            ("contact_share", 0.0, 1e6),
-        ):
-            value = getattr(self, key)
-            if not (is_number(value) and math.isfinite(value)):
-                raise InputError(f"relax: {key} = {value!r} is not a number")
-            if not low <= value <= high:
-                raise InputError(f"relax: {key} = {value!r} is out of range; must be {low:g} to {high:g}")
-            if key in ("max_steps", "check_every") and not is_number(value, whole=True):
-                raise InputError(f"relax: {key} = {value!r} is not a whole number")
+        expect_within(self, self.BOUNDS, "relax")
         if not isinstance(self.kinetic_damping, bool):
             raise InputError(f"relax: kinetic_damping = {self.kinetic_damping!r} is neither True nor False")
         if self.solver not in SOLVERS:

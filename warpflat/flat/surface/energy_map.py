@@ -69,17 +69,18 @@ def _along(surface: Surface, density: FloatArray, line: IntArray) -> dict[str, f
     return {"length_m": length, "mean_j_per_m2": mean, "peak_j_per_m2": float(along.max())}
 
 
-def place_in_words(surface: Surface, vertex: int) -> str:
+def place_in_words(surface: Surface, vertex: int, *, lines: int = 2) -> str:
     """Describe the place of a vertex for a pattern maker, such as "4 mm above bust line, 12 mm from princess front".
 
-    Distances to the two nearest lines are straight in space: near a line that is what a tape measures to less than a millimetre.
+    Distances to the nearest lines, two unless more are asked for, are straight in space: near a line that is what a tape measures to
+    less than a millimetre.
     """
     here = surface.vertices[vertex]
     offsets = {name: nearest_on_polyline(here, surface.vertices[line]) - here for name, line in surface.lines.items()}
     away = {name: float(np.linalg.norm(offset)) for name, offset in offsets.items()}
     phrases = []
     # Lines that are equally near, to the micrometre, stay in the surface's order.
-    for name in sorted(away, key=lambda name: round(away[name], 6))[:2]:
+    for name in sorted(away, key=lambda name: round(away[name], 6))[:lines]:
         if away[name] < 1e-3:
             phrases.append(f"on {name}")
             continue

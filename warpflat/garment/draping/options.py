@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from warpflat.core import InputError, is_number
+from warpflat.core import expect_within
 
 __all__ = ["DrapeOptions"]
 
@@ -37,8 +37,4 @@ class DrapeOptions:
     }  # fmt: skip
 
     def __post_init__(self) -> None:
-        for name, (lowest, highest) in self.BOUNDS.items():
-            value, whole = getattr(self, name), name == "max_steps"
-            if not is_number(value, whole=whole) or not lowest <= value <= highest:
-                kind = "whole number" if whole else "number"
-                raise InputError(f"drape: {name} = {value!r}; must be a {kind} between {lowest:g} and {highest:g}")
+        expect_within(self, self.BOUNDS, "drape")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -89,6 +90,8 @@ def find_places(
             return
         line = _line_at(cloth, worst)
         piece, _, near = line.partition(".")
+        # The leg of a dart is called by the dart.
+        near = re.sub(r"\.(left|right)$", "", near).replace("_", " ")
         called = f"{piece.replace('_', ' ')} near {near}" if near else "the cloth"
         # The area of a place that goes on into other pieces is not that of the one that is named.
         share = {name: np.isin(cloth.welded[rows], part).sum() for name, rows in cloth.piece_vertices.items()}
@@ -116,7 +119,9 @@ def find_places(
             if kind == "bridged":
                 words = f"bridges a hollow, {1e3 * distance:.1f} mm off,"
             elif gapes:
-                words = f"gapes by {1e3 * gap[worst]:.1f} mm"
+                # Its gap to the body is more than its misfit where it was designed off the body, or spans a hollow.
+                of_it = f", {1e3 * distance:.1f} mm of it misfit," if gap[worst] - distance > 5e-5 else ""
+                words = f"gapes by {1e3 * gap[worst]:.1f} mm{of_it}"
             elif stands_off:
                 words = f"stands off {1e3 * distance:.1f} mm from the {compared_with},"
             elif lift[worst] < -0.5 * distance:

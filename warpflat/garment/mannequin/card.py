@@ -41,7 +41,7 @@ _HOW: Mapping[str, str] = {
     "waist": "around the narrowest part; tie a string there for the other measurements",
     "abdomen": "around the belly, half-way from waist to hip",
     "hip": "around the widest part of the seat, level all around",
-    "upper_arm": "around the upper arm, where it is widest",
+    "upper_arm": "around the biceps, where the upper arm is widest",
     "elbow": "around the bent elbow",
     "wrist": "around the wrist bone",
     "hand": "around the knuckles, with the thumb laid in",

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, unit
+from warpflat.core import FloatArray, InputError
 from warpflat.pattern.drafting.dart_allowance import dart_allowance
 from warpflat.pattern.drafting.hem_allowance import fold_hem
 from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT
@@ -80,8 +80,7 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
         elif (hem := fold_hem(sides, strips, index, after, body)) is not None:
             parts += hem
         elif isinstance(follows := sides[after], Side):
-            a, b = unit(side.points[-1] - side.points[-2]), unit(follows.points[1] - follows.points[0])
-            fill = corner_fill(side.points[-1], a, b, side.width, follows.width)
+            fill = corner_fill(side.points[-1], side.arrives, follows.leaves, side.width, follows.width)
             parts += [] if fill is None else [fill]
     whole = close_slits(union([*parts, *strips]))
     for side in sides:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, points_at_lengths, unit
+from warpflat.core import FloatArray, InputError, dart_words, points_at_lengths, unit
 from warpflat.pattern.drafting.hem_allowance import HEM_SLANT
 from warpflat.pattern.drafting.polygons import (
     GRID,
@@ -54,12 +54,8 @@ def dart_allowance(
         raise InputError("two darts meet in one point of the border: leave an edge between them")
     mouth_left, mouth_right = wedge.left[0], wedge.right[-1]
     on_left, on_right = _prolonged_legs(wedge, left, right)
-    along_left, along_right = (
-        unit(left.points[-1] - left.points[-2]),
-        -unit(right.points[1] - right.points[0]),
-    )
-    strips[before], end_left = _end_at_leg(strips[before], left.width, mouth_left, on_left, along_left, mouth_right)
-    strips[after], end_right = _end_at_leg(strips[after], right.width, mouth_right, on_right, along_right, mouth_left)
+    strips[before], end_left = _end_at_leg(strips[before], left.width, mouth_left, on_left, left.arrives, mouth_right)
+    strips[after], end_right = _end_at_leg(strips[after], right.width, mouth_right, on_right, -right.leaves, mouth_left)
     # The wedge is folded on the chord of a leg, which a curved leg leaves.
     lobes = [_between_leg_and_chord(wedge.left), _between_leg_and_chord(wedge.right)]
     if wedge.fold_to == "left":
@@ -73,7 +69,7 @@ def dart_allowance(
     if not whole:
         cap, _ = _half_cap(wedge, body, covered, mouth, beyond, leg + spare)
         notes.append(
-            f"dart {wedge.name} meets the border at so low an angle that its wedge is not caught in the seam: "
+            f"{dart_words(wedge.name)} meets the border at so low an angle that its wedge is not caught in the seam: "
             "turn the dart, or open it less"
         )
     return (on_left, on_right), [end_left, end_right, *lobes, cap, reflect(cap, wedge.tip, wedge.middle)], notes

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, optional_step, polyline_length
+from warpflat.core import FloatArray, InputError, dart_words, optional_step, polyline_length
 from warpflat.pattern.drafting.allowance import cut_hole, cut_outline
 from warpflat.pattern.drafting.curves import TOLERANCE, Curve
 from warpflat.pattern.drafting.drafted import (
@@ -186,7 +186,7 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
     for name, line in fisheyes.items():
         first, second = map(polyline_length, fisheye_legs(line))
         if abs(first - second) > SEAM_TOLERANCE:
-            uneven.append(f"dart {name}: its sides differ by {length_words(abs(first - second), piece.units)}")
+            uneven.append(f"{dart_words(name)}: its sides differ by {length_words(abs(first - second), piece.units)}")
     # What even the widest tolerance leaves wavy.
     wavy = [e.name for e in edges if tolerance is None and e.tolerance > TOLERANCE and is_wavy(e.curve)]
     ragged = [

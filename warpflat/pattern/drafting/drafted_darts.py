@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, resample
+from warpflat.core import FloatArray, dart_words, resample
 from warpflat.flat import are_curved
 from warpflat.pattern.drafting.curves import TOLERANCE, farthest, fit_curve
 from warpflat.pattern.drafting.dart_allowance import WIDEST_DART
@@ -84,15 +84,17 @@ def dart_notes(drafted: DraftedDart, left: DraftedEdge, right: DraftedEdge, unit
     dart, mouth, notes = drafted.dart, length_words(drafted.opening, units), list[str]()
     bend = length_words(max(farthest(leg.line[[0, -1]], leg.line) for leg in (left, right)), units)
     if dart.pleat is None and abs(left.length - right.length) > SEAM_TOLERANCE:
-        notes.append(f"dart {dart.name}: its legs differ by {length_words(abs(left.length - right.length), units)}")
+        notes.append(
+            f"{dart_words(dart.name)}: its legs differ by {length_words(abs(left.length - right.length), units)}"
+        )
     if drafted.fold is None and left.width > 0:
         why = f"its legs bend by {bend}" if dart.cut else "it opens too wide"
-        notes.append(f"dart {dart.name} is cut away, not folded: {why}; sew its legs as a seam")
+        notes.append(f"{dart_words(dart.name)} is cut away, not folded: {why}; sew its legs as a seam")
     if dart.pleat is not None:
         notes.append(f"pleat {dart.name}: fold {mouth}, sew {length_words(dart.pleat, units)} down from the edge")
     elif drafted.fold is not None and dart.cut:
         notes.append(
-            f"dart {dart.name} is folded, not cut away: its mouth of {mouth} has no room for the "
+            f"{dart_words(dart.name)} is folded, not cut away: its mouth of {mouth} has no room for the "
             f"allowances of its legs, which bend by {bend}; pin leg on leg"
         )
     return notes

@@ -377,9 +377,7 @@ class _Annotations:
         line = Stroke(role="grain", name="", points=np.stack([a, a + depth * inwards, b + depth * inwards, b]))
         bracket = [line, _arrow(a, -inwards), _arrow(b, -inwards)]
         self.strokes += bracket
-        angle = float(np.arctan2(span[1], span[0]))
-        if angle > np.pi / 2 + 1e-6 or angle <= -np.pi / 2 + 1e-6:
-            angle += np.pi
+        angle = float(np.arctan2(*as_read(span / length)[::-1]))
         places = [a + share * (b - a) + (depth / 2) * inwards for share in (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8)]
         inside = [Spot(x=float(x), y=float(y), angle=angle) for x, y in places]
         self._write(translate("PLACE ON FOLD"), min(0.0035, length / 20), inside, enough=CLEAR)

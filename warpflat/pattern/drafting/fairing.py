@@ -11,7 +11,7 @@ from scipy.linalg import solve_banded
 from warpflat.core import BoolArray, FloatArray, arc_lengths, points_at_lengths, unit
 from warpflat.pattern.drafting.curves import farthest
 
-__all__ = ["FairLine", "bend_one_way", "count_inflections", "fair_line", "fairest_line"]
+__all__ = ["FairLine", "bend_one_way", "count_inflections", "fair_line", "fair_lines", "fairest_line"]
 
 #: A line is faired at places this far apart [m], but at no fewer and no more of them than this.
 STEP, FEWEST, MOST = 0.003, 24, 200
@@ -91,15 +91,15 @@ def fair_line(
         met: #P, points that the line goes through, as those at which a girth was measured; of a straight row only where it allows.
         mirrored: whether the line goes on beyond its first and its last point as its mirror image in an upright line.
     """
-    return next(_fair_lines(points, [wave], straight, met, mirrored))
+    return next(fair_lines(points, [wave], straight, met, mirrored))
 
 
-def _fair_lines(
+def fair_lines(
     points: FloatArray,
     waves: Iterable[float],
-    straight: BoolArray | None,
-    met: BoolArray | None,
-    mirrored: tuple[bool, bool],
+    straight: BoolArray | None = None,
+    met: BoolArray | None = None,
+    mirrored: tuple[bool, bool] = (False, False),
 ) -> Iterator[FairLine]:
     """Yield the line of :func:`fair_line` for each wave [m]; the waves share the equations."""
     places, even = _evenly(points)
@@ -195,7 +195,7 @@ def fairest_line(
     """
     best: FairLine | None = None
     least = np.inf
-    for tried in _fair_lines(points, FIRST_WAVE * GROWTH ** np.arange(WAVES), straight, met, mirrored):
+    for tried in fair_lines(points, FIRST_WAVE * GROWTH ** np.arange(WAVES), straight, met, mirrored):
         if tried.shift > bound:
             break
         cost = tried.shift + WORTH * tried.inflections

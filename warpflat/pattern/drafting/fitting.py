@@ -11,6 +11,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, arc_lengths, polyline_length, segment_lengths, turning_angles
 from warpflat.pattern.drafting.curves import TOLERANCE, Curve, chords, farthest, fit_curve
+from warpflat.pattern.drafting.fairing import fair_lines
 from warpflat.pattern.drafting.piece_parts import SAME_POINT
 from warpflat.pattern.drafting.pieces import Piece, Seam
 from warpflat.pattern.drafting.seam_difference import (
@@ -343,22 +344,16 @@ def smooth_line(line: FloatArray) -> FloatArray:
     Args:
         line: #P by 2 [m].
     """
-    from scipy.interpolate import make_smoothing_spline
-
-    arc = arc_lengths(line)
-    edge = float(np.median(np.diff(arc)))
-    if len(line) < 5 or np.diff(arc).min() < SAME_POINT or not is_wavy(chords(line)):
+    steps = segment_lengths(line)
+    edge = float(np.median(steps))
+    if len(line) < 5 or steps.min() < SAME_POINT or not is_wavy(chords(line)):
         return line
-    weights = np.ones(len(line))
-    weights[[0, -1]] = 1e6
-    smooth, places = line, np.linspace(0.0, arc[-1], 2 * len(line))
-    for wave in WAVES:
-        stiffness = (wave * edge / (2 * np.pi)) ** 4 * len(line) / arc[-1]
-        tried = make_smoothing_spline(arc, line, w=weights, lam=stiffness)(places)
-        tried[[0, -1]] = line[[0, -1]]
-        if farthest(tried, line) > edge:
+    smooth, ends = line, np.isin(np.arange(len(line)), [0, len(line) - 1])
+    for tried in fair_lines(line, (wave * edge for wave in WAVES), met=ends):
+        if tried.shift > edge:
             break
-        smooth = tried
+        smooth = tried.points
+        smooth[ends] = line[ends]
         if not is_wavy(chords(smooth)):
             break
     return smooth

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import polyline_length, unit
+from warpflat.core import polyline_length
 from warpflat.pattern.drafting.polygons import (
     cut_off,
     difference,
@@ -49,7 +49,7 @@ def fold_hem(
     side, follows = sides[index], sides[after]
     if not isinstance(side, Side) or not isinstance(follows, Side) or {side.kind, follows.kind} != {"hem", "seam"}:
         return None
-    a, b = unit(side.points[-1] - side.points[-2]), unit(follows.points[1] - follows.points[0])
+    a, b = side.arrives, follows.leaves
     if abs(turn_between(a, b) - np.pi / 2) >= HEM_SLANT:
         return None
     # Of the hem and of the seam the number, the side, and the way from the corner along it.

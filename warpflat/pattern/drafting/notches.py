@@ -140,7 +140,7 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
                 made.append((here.piece, notch))
                 found.setdefault(key, []).append(along)
             waiting.append((number, 1 - side, opposite_length(seam, lines[number], side, length)))
-            waiting += [copy[:3] for copy in copies if (copy[3].mirrored, copy[3].copy) != (here.mirrored, here.copy)]
+            waiting += [copy[:3] for copy in copies if copy[3].cloth != here.cloth]
         for key, rows in found.items():
             placed.setdefault(key, []).extend(rows)
         for piece, notch in made:

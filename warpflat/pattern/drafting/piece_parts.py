@@ -172,7 +172,7 @@ class FoundSeam:
 
     Attributes:
         name: as "side left"; where pieces are named by what they cover, their seams in the pattern may be parts of it.
-        length: [m].
+        length: on the garment as it is worn [m]; its sides in the pattern may differ, as those of a band that is stretched.
         released: strain energy that it releases, by trial [J]; None where nothing was tried.
         needed: why the cloth cannot lie flat without it: "opens a tube"; "" where it can.
     """

@@ -189,6 +189,11 @@ class SeamSide:
         return self.piece, self.edge
 
     @property
+    def cloth(self) -> tuple[str, bool, int]:
+        """Which piece of cloth it is of: name of the piece, whether it is cut turned over, and number of the copy."""
+        return self.piece, self.mirrored, self.copy
+
+    @property
     def is_drawn(self) -> bool:
         """Whether it is the piece itself, not another copy."""
         return not self.mirrored and self.copy == 0

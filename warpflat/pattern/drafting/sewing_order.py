@@ -203,7 +203,7 @@ class _Workshop(SewingTasks):
     def _corner(self, side: SeamSide, *, end: bool) -> Corner:
         order = self.order[side.piece]
         at = order.index(side.edge) + (end != side.reversed)
-        return side.piece, side.mirrored, side.copy, at % len(order)
+        return *side.cloth, at % len(order)
 
     def _ends(self, seam: Seam) -> list[tuple[Corner, Corner]]:
         """Return the corners that a seam joins at its start and at its end."""
@@ -299,22 +299,21 @@ class _Workshop(SewingTasks):
 
         def joined(seam: Seam) -> frozenset[object]:
             """Return the pieces of cloth that a seam joins, one where they are sewn together already."""
-            ends = [(row[0].piece, row[0].mirrored, row[0].copy) for row in seam.sides]
-            return frozenset(cloth.get(end, end) for end in ends)
+            return frozenset(cloth.get(row[0].cloth, row[0].cloth) for row in seam.sides)
 
         def shape(task: Task) -> tuple[int, bool, bool, bool, bool]:
             """Return the turn of a task; of a seam whether it is eased, closes a ring, joins left and right, and front and back."""
             if task.technique not in ("", "lining_join"):
                 return task.how["turn"], False, False, False, False
             seam = task.seams[0]
-            first, second = ((row[0].piece, row[0].mirrored, row[0].copy) for row in seam.sides)
+            first, second = (row[0].piece for row in seam.sides)
             here = joined(seam)
             closes = len(here) == 1
             if len(task.seams) > 1 and all(joined(image) == here for image in task.seams):
                 # The second of both side seams closes a skirt, where nothing else is left that joins its front and back.
                 closes = closes or not any(joined(s) == here for t in self.tasks if t is not task for s in t.seams)
-            centre = first[0] == second[0] or other_side(first[0]) == second[0]
-            one, other = (self.pieces[part[0]].worn_at for part in (first, second))
+            centre = first == second or other_side(first) == second
+            one, other = (self.pieces[piece].worn_at for piece in (first, second))
             differ = bool(one and other) and one != other
             return task.how["turn"], 5e-4 < abs(seam.ease) < GATHERED, closes, centre, differ
 
@@ -370,7 +369,7 @@ class _Workshop(SewingTasks):
                 ready.remove(task)
                 for seam in task.seams:
                     whole.update(frozenset(pair) for pair in self._ends(seam))
-                    parts = [(s.piece, s.mirrored, s.copy) for s in seam.stretches]
+                    parts = [side.cloth for side in seam.stretches]
                     names = {cloth.get(part, part) for part in parts}
                     cloth |= dict.fromkeys(parts, parts[0])
                     cloth = {part: parts[0] if name in names else name for part, name in cloth.items()}

@@ -85,7 +85,7 @@ class SewingTasks:
         units: of lengths in words.
         drafted, pieces, titles: the pieces by name, and what they are called.
         order: the edges of each piece in their order.
-        seams: of the garment.
+        seams, sewn: of the garment, and the edges that they take.
         above: the half that lies above where it buttons, "right" or "left".
         lengths: of both sides of each seam [mm].
         tasks: each seam with its mirror images, and each finishing; every free edge is used up by one of them.
@@ -98,6 +98,7 @@ class SewingTasks:
         self.pieces = {piece.name: piece for piece in garment.garment.pieces[size]}
         self.titles = piece_titles(list(self.pieces.values()))
         self.seams = garment.garment.seams
+        self.sewn = {side.place for seam in self.seams for side in seam.stretches}
         self.above = "right" if garment.garment.worn is None else garment.garment.worn.buttonholes
         self.order = {name: [edge.name for edge in piece.edges] for name, piece in self.pieces.items()}
         self.lengths = {report.name: report.length_mm for report in garment.seams if report.size == size}
@@ -221,18 +222,16 @@ class SewingTasks:
 
     def _free_beside_fold(self, piece: str) -> list[str]:
         """Return the edges beside a grown-on facing that no seam takes: the upper end of a button stand beside a collar."""
-        taken = {side.place for seam in self.seams for side in seam.stretches}
         order, grown = self.order[piece], self._grown_on(piece)
         beside = [order[(order.index(edge) + step) % len(order)] for edge in grown for step in (-1, 1)]
         return [
             edge
             for edge in dict.fromkeys(beside)
-            if edge not in grown and (piece, edge) not in taken and self.pieces[piece].edge(edge).kind == "seam"
+            if edge not in grown and (piece, edge) not in self.sewn and self.pieces[piece].edge(edge).kind == "seam"
         ]
 
     def _turned_over(self, seam: Seam) -> list[Place]:
         """Return what no seam takes beside a collar: ends of facings, which are turned over its ends, and of button stands."""
-        taken = {side.place for each in self.seams for side in each.stretches}
         shell = [side for side in seam.stretches if self.pieces[side.piece].role == "shell"]
         facings = {
             side.piece
@@ -246,7 +245,7 @@ class SewingTasks:
             (piece, edge)
             for piece in [*sorted(facings), *(pieces_of((side.piece, "") for side in shell) if facings else ())]
             for edge in self.order[piece]
-            if (piece, edge) not in taken and line_name(edge) in along
+            if (piece, edge) not in self.sewn and line_name(edge) in along
         ]
 
     def _take(self, places: Iterable[Place]) -> list[Place]:
@@ -271,9 +270,8 @@ class SewingTasks:
 
     def _finish(self, elastics: Sequence[Elastic]) -> None:
         """Add the tasks that finish edges and pieces, until every free edge is used up by one of them."""
-        sewn = {side.place for seam in self.seams for side in seam.stretches}
         # What is cut twice is drawn for one side.
-        sewn |= {(of, other_side(edge)) for piece, edge in sewn for of in (piece, other_side(piece))}
+        sewn = self.sewn | {(of, other_side(edge)) for piece, edge in self.sewn for of in (piece, other_side(piece))}
         # A line of another program's file does not say what is to become of it.
         self._free = {
             (piece.name, edge.name): edge.kind

@@ -36,6 +36,16 @@ class Side:
     width: float
     kind: str
 
+    @property
+    def leaves(self) -> FloatArray:
+        """Unit vector in which it leaves its first point."""
+        return unit(self.points[1] - self.points[0])
+
+    @property
+    def arrives(self) -> FloatArray:
+        """Unit vector in which it arrives at its last point."""
+        return unit(self.points[-1] - self.points[-2])
+
     def __post_init__(self) -> None:
         if self.width < GRID:
             object.__setattr__(self, "width", 0.0)

@@ -170,13 +170,21 @@ def _beside_on_one_sheet(place: Placed, others: Sequence[Placed], tiling: Tiling
 
 
 def too_many_sheets(garment: DraftedGarment, paper: str) -> str:
-    """Return why nobody would print a pattern on sheets of this paper, "" where one would: cloth of a wrong unit takes thousands."""
+    """Return why nobody would print a pattern on sheets of this paper, "" where one would: cloth of a wrong unit takes thousands.
+
+    The garment may have its whole pieces: of those that are printed as halves on the fold half counts.
+    """
     if paper not in PAPERS or not PAPERS[paper].tiled:
         return ""
     import shapely
 
-    area = sum(shapely.Polygon(piece.cut_line).area for row in garment.pieces.values() for piece in row)
-    sheets = area / float(np.prod(PAPERS[paper].step))
+    step = float(np.prod(PAPERS[paper].step))
+
+    def sheets_of(drafted: DraftedGarment) -> float:
+        return sum(shapely.Polygon(piece.cut_line).area for row in drafted.pieces.values() for piece in row) / step
+
+    sheets = sheets_of(garment)
+    sheets = sheets_of(halved(garment)) if sheets > MOST_SHEETS else sheets
     return f"it would take some {sheets:,.0f} sheets; check the units, or take A0 paper" if sheets > MOST_SHEETS else ""
 
 

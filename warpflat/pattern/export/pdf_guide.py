@@ -316,8 +316,10 @@ def _prices(page: _Page, found: Sequence[FoundSeam]) -> None:
             ]
         )
     page.heading(translate("What each seam is for"), 3 * LINE)
-    page.paragraph(translate("The strain energy that a seam takes from the cloth, for its length of sewing."))
-    page.table(["", *map(translate, ("length", "releases", "per length"))], rows, (0.34, 0.16, 0.34, 0.16))
+    page.paragraph(
+        translate("The strain energy that a seam takes from the cloth, for its length on the garment as it is worn.")
+    )
+    page.table(["", *map(translate, ("length as worn", "releases", "per length"))], rows, (0.34, 0.16, 0.34, 0.16))
 
 
 def _step(page: _Page, number: int, sewing: SewingStep, pieces: Sequence[tuple[DraftedPiece, frozenset[str]]]) -> None:

@@ -140,6 +140,7 @@ def _own_piece(
     """
     name, size, grain = group.get("data-piece", ""), group.get("data-size", ""), None
     parts, legs, cutting = list[tuple[str, str, FloatArray]](), list[FloatArray](), list[FloatArray]()
+    folds = dict[str, FloatArray]()
     for element in group:
         role, edge = element.get("class", ""), element.get("data-edge", "")
         if _tag(element) != "path" or not (edge or role in ("dart", "drill")):
@@ -156,6 +157,8 @@ def _own_piece(
             words.setdefault(size, []).extend((name, edge, text) for text in sewn if text)
         elif role in _KINDS:
             legs.append(line.points)
+        elif role == "dart_fold":
+            folds[edge.removesuffix(".fold")] = line.points[0]
         elif role in _NOT_READ and (edge or line.closed):
             unread.append(_NOT_READ[role])
     # A closed line is the sewing line of a hole, but where it goes around the whole piece.
@@ -172,8 +175,14 @@ def _own_piece(
     if not parts:
         raise InputError(f"{where}: has no sewing line; a group of a piece has paths with data-edge")
     ends = np.array([line[k] for _, kind, line in parts if kind == "dart" for k in (0, -1)]).reshape(-1, 2)
-    close = cKDTree(ends).query(ends, k=2)[0][:, 1] < SAME_POINT if len(ends) else []
-    tips = {f"dart_{n}": end for n, end in enumerate(ends) if close[n]}
+    close = cKDTree(ends).query(ends, k=2)[0][:, 1] < SAME_POINT if len(ends) else slice(0)
+    ends, tips = ends[close], dict[str, FloatArray]()
+    # The line on which a dart is folded has its name, and begins at its tip, that of a pleat as far from it as it is open.
+    for dart in [name for name in folds if name not in {eye.name for eye in eyes}] if len(ends) else ():
+        tips[dart] = ends[np.linalg.norm(ends - folds[dart], axis=1).argmin()]
+    for end in ends:
+        if not any(np.linalg.norm(end - tip) < SAME_POINT for tip in tips.values()):
+            tips[find_unused_name("dart", tips)] = end
     edges, darts = named_outline(parts, tips, legs, cutting, where)
     quantity = read_quantity(group.get("data-quantity", "1"))
     return Piece(name=name, size=size, edges=edges, darts=darts, holes=eyes, grain=grain, quantity=quantity)
