@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import warpflat
-from warpflat.app.scene.fit import FitJob
-from warpflat.garment.mannequin.body_model import finer_body
+from warpflat.app.scene.fit import read_job
 from warpflat.pattern.export.dressed import Body, dress
 from warpflat.pattern.export.figure import drawn_page
 from warpflat.pattern.export.views import View, draw_row
@@ -32,11 +31,11 @@ def main(file: str) -> None:
         path = Path(folder) / "tshirt.obj"
         rows = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in form.vertices.tolist()]
         path.write_text("\n".join([*rows, *("f " + " ".join(str(v + 1) for v in f) for f in faces.tolist()), ""]))
-        job = FitJob.start(path, units="m", body=BODIES[0])
+        job = read_job(path, units="m", body=BODIES[0])
         with drawn_page(file, 11.0, 3.9, dpi=110) as pen:
             for number, body in enumerate(BODIES):
                 carried = job.to(body, {})
-                wearer = Body(vertices=carried.skin, faces=finer_body()[1])
+                wearer = Body(vertices=carried.skin, faces=carried.skin_faces)
                 # The form has vertices beyond the shirt.
                 room = carried.vertices[np.unique(faces[faces >= 0])]
                 points, facets, skin = dress(wearer, carried.vertices, faces.astype(np.int32), room)

@@ -8,6 +8,7 @@ import sys
 from contextlib import suppress
 
 from warpflat.core.errors import InputError
+from warpflat.core.threads import core_count
 
 __all__ = [
     "is_out_of_memory",
@@ -39,9 +40,8 @@ def require_memory_for_libraries() -> None:
     Raises:
         InputError: they cannot.
     """
-    cores = _cores()
     given = [os.environ.get(name, "") for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")]
-    threads = min([cores, *(max(int(number), 1) for number in given if number.isdecimal())])
+    threads = min([core_count(), *(max(int(number), 1) for number in given if number.isdecimal())])
     _require(_LIBRARIES + _OPENBLAS_THREAD * threads, "loading the libraries", "")
 
 
@@ -102,8 +102,4 @@ def _require(megabytes: float, what: str, remedy: str) -> None:
 
 def _usd() -> float:
     threads = os.environ.get("PXR_WORK_THREAD_LIMIT", "")
-    return _USD + _USD_THREAD * (int(threads) if threads.isdecimal() and int(threads) > 0 else _cores())
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return _USD + _USD_THREAD * (int(threads) if threads.isdecimal() and int(threads) > 0 else core_count())

@@ -7,7 +7,12 @@ from functools import lru_cache
 
 from warpflat.core.errors import InputError
 
-__all__ = ["thread_count"]
+__all__ = ["core_count", "thread_count"]
+
+
+def core_count() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def thread_count() -> int:
@@ -22,7 +27,7 @@ def thread_count() -> int:
 @lru_cache
 def _thread_count(wished: str) -> int:
     if not wished:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        return core_count()
     if not wished.isdecimal() or int(wished) < 1:
         raise InputError(f"WARPFLAT_THREADS = {wished!r}; must be a whole number of threads, 1 or more")
     return int(wished)

@@ -39,7 +39,6 @@ from .fabric.library import load_library as load_library
 from .fabric.limits import Demand as Demand
 from .flattening.applied_cut import AppliedCut as AppliedCut
 from .flattening.applied_cut import cut_sides as cut_sides
-from .flattening.applied_cut import measure_cut as measure_cut
 from .flattening.applied_cut import seam_kind as seam_kind
 from .flattening.datum import resolve_datum as resolve_datum
 from .flattening.develop import Development as Development
@@ -47,7 +46,6 @@ from .flattening.develop import develop as develop
 from .flattening.edit import change_fabric as change_fabric
 from .flattening.edit import change_surface as change_surface
 from .flattening.fit_report import Remedy as Remedy
-from .flattening.fit_report import garment_wear as garment_wear
 from .flattening.fit_report import no_cut_words as no_cut_words
 from .flattening.fit_report import remedy_words as remedy_words
 from .flattening.flatten_all import flatten_all as flatten_all
@@ -62,7 +60,6 @@ from .flattening.progress import Progress as Progress
 from .flattening.progress import laid_stage as laid_stage
 from .flattening.progress import make_stage as make_stage
 from .flattening.progress import make_stages as make_stages
-from .flattening.progress import relaxation_words as relaxation_words
 from .flattening.result import Flattening as Flattening
 from .flattening.result import run_metrics as run_metrics
 from .flattening.step_by_step import RelaxationStep as RelaxationStep

@@ -13,7 +13,16 @@ import trimesh
 from bodies import body_of_size, mean_person
 from command import Command
 
-from warpflat.app.scene.fit import STUDY_FILES, FitJob, Fitted, ease_wishes, fit_to, study_table
+from warpflat.app.scene.fit import (
+    STUDY_FILES,
+    Fitted,
+    carry_cuts,
+    ease_wishes,
+    fit_to,
+    keeps_pattern,
+    read_job,
+    study_table,
+)
 from warpflat.core.errors import InputError
 from warpflat.core.output import refuse_to_replace_others
 from warpflat.garment.construction.file_seams import file_seams
@@ -96,9 +105,9 @@ def test_a_skirt_is_fitted_to_another_size(command: Command):
 def test_a_known_pattern_is_graded_and_keeps_its_grain(tmp_path: Path):
     """Panels that are measured in millimetres, as of Style3D: 480 mm wide each, as much wider as the skirt is."""
     _skirt(tmp_path / "skirt.obj", measured=1e3)
-    job = FitJob.start(tmp_path / "skirt.obj", units="m", body="EU 36")
-    assert job.keeps_pattern({})
-    assert not job.keeps_pattern({"find_seams": {"find": "auto"}})
+    job = read_job(tmp_path / "skirt.obj", units="m", body="EU 36")
+    assert keeps_pattern(job, {})
+    assert not keeps_pattern(job, {"find_seams": {"find": "auto"}})
     result = fit_to(
         job, job.to("EU 42", {}), {"output": {"frames": 0, "picture": False}}, tmp_path / "out", name="skirt"
     )
@@ -116,7 +125,7 @@ def test_a_known_pattern_is_graded_and_keeps_its_grain(tmp_path: Path):
     assert result.metrics["pattern_of_file"]["unit"] == "mm"
     assert result.metrics["pattern_of_file"]["area_ratio"] == pytest.approx(0.8, abs=0.1)
     _skirt(tmp_path / "painted.obj")
-    assert not FitJob.start(tmp_path / "painted.obj", units="m", body="EU 36").panels
+    assert not read_job(tmp_path / "painted.obj", units="m", body="EU 36").panels
 
 
 def test_several_bodies_are_a_study_with_asked_ease(command: Command):
@@ -156,11 +165,11 @@ def test_scans_of_one_name_are_told_apart_and_none_is_replaced(command: Command)
 
 def test_without_its_body_one_is_fitted_inside(tmp_path: Path):
     _skirt(tmp_path / "skirt.obj", unit=0.01)
-    job = FitJob.start(tmp_path / "skirt.obj", units="cm")
+    job = read_job(tmp_path / "skirt.obj", units="cm")
     assert "was fitted inside" in job.notes[0]
     carried = job.to("EU 42", {})
     assert carried.kept()[1]
-    assert carried.vertices.shape == job.read.raw.vertices.shape
+    assert carried.vertices.shape == job.raw.vertices.shape
     # What its cloth cannot bear is told beside an ease that is kept.
     for fits, word in ((True, "yes"), (False, "no")):
         verdict = {"fits": fits, "words": f"{'fits' if fits else 'does not fit'} by its strain"}
@@ -180,7 +189,7 @@ def test_without_its_body_one_is_fitted_inside(tmp_path: Path):
 )
 def test_the_front_is_turned_to_where_a_body_faces(tmp_path: Path, front: str, faces: tuple[float, float, float]):
     _skirt(tmp_path / "skirt.obj")
-    job = FitJob.start(tmp_path / "skirt.obj", units="m", front=front)
+    job = read_job(tmp_path / "skirt.obj", units="m", front=front)
     assert np.array(faces) @ job.turn == pytest.approx([0.0, 0.0, 1.0])
 
 
@@ -255,7 +264,7 @@ def test_a_garment_ends_as_its_wearer_sits_where_the_pose_is_kept(command: Comma
     ended = command("fit", "skirt.obj", "--units", "m", *ON, "--to", "EU 42", "--keep-pose", "--out", "none", *BARE)
     assert ended.code == 2
     assert "'EU 42' is a size, which stands" in ended.err
-    job = FitJob.start(Path("skirt.obj"), units="m", body="EU 36")
+    job = read_job(Path("skirt.obj"), units="m", body="EU 36")
     stands, sits = job.to("EU 36", {}), job.to("rider.obj", {}, keep_pose=True)
     # The hem of a skirt to the thigh goes ahead with the thighs; the ease is that of the body standing.
     hem = stands.vertices[:, 1] < stands.vertices[:, 1].min() + 0.02
@@ -267,7 +276,7 @@ def test_a_garment_ends_as_its_wearer_sits_where_the_pose_is_kept(command: Comma
     middle = 0.5 * float(job.layers[0][0][:, 1].min() + job.layers[0][0][:, 1].max())
     cuts = [{"name": "half", "plane": {"point": [0.0, middle, 0.0], "normal": [0.0, 1.0, 0.0]}}]
     (there,), (same,) = (
-        job.carry_cuts(on, cuts) for on in (sits, replace(sits, vertices=job.read.raw.vertices * job.read.scale))
+        carry_cuts(job, on, cuts) for on in (sits, replace(sits, vertices=job.raw.vertices * job.scale))
     )
     assert there["name"] == "half"
     assert there["closed"]
@@ -278,13 +287,13 @@ def test_a_garment_ends_as_its_wearer_sits_where_the_pose_is_kept(command: Comma
     assert np.ptp(line[:, 1]) > 0.02
     # An upright plane meets front and back, and cuts but the nearest if asked to.
     upright = {"point": [0.0, middle, 1.0], "normal": [1.0, 0.0, 0.0]}
-    assert len(job.carry_cuts(sits, [{"plane": upright}])) == 2
-    (front,) = job.carry_cuts(sits, [{"plane": {**upright, "nearest": True}}])
+    assert len(carry_cuts(job, sits, [{"plane": upright}])) == 2
+    (front,) = carry_cuts(job, sits, [{"plane": {**upright, "nearest": True}}])
     assert np.array(front["line"])[:, 2].mean() > sits.vertices[:, 2].mean()
-    (drawn,) = job.carry_cuts(sits, [{"points": same["line"][:2]}])
+    (drawn,) = carry_cuts(job, sits, [{"points": same["line"][:2]}])
     np.testing.assert_allclose(drawn["points"], there["line"][:2], atol=1e-9)
     with pytest.raises(InputError, match="the plane misses the garment"):
-        job.carry_cuts(sits, [{"plane": {"point": [0.0, 9.0, 0.0], "normal": [0.0, 1.0, 0.0]}}])
+        carry_cuts(job, sits, [{"plane": {"point": [0.0, 9.0, 0.0], "normal": [0.0, 1.0, 0.0]}}])
     ended = command(
         "fit", "skirt.obj", "--units", "m", *ON, "--to", "EU 42", "--cut-seam", "marked", "--out", "none", *BARE
     )

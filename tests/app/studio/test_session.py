@@ -277,6 +277,29 @@ def test_a_mesh_is_opened_as_a_scene_that_can_be_saved(tmp_path: Path) -> None:
         scene_of_mesh(tmp_path / "none.obj", units="m")
 
 
+def test_a_scene_file_of_any_name_can_be_opened(tmp_path: Path) -> None:
+    file = tmp_path / "Ärmel (1).toml"
+    file.write_text('surface = { shape = "dome" }\n')
+    assert free_name(load_scene(file)) == "Armel _1"
+
+
+def test_what_is_draped_is_what_a_run_drapes(tmp_path: Path) -> None:
+    """The sewn garment, on its elastics: a piece whose sides are sewn, and a skirt with a casing."""
+    session = bodice(tmp_path, seams=[{"name": "sides", "sides": ["left", "right"]}], drape={"max_steps": 1})
+    session.ask_drape()
+    drape = session.step.drape
+    assert drape is not None, session.error
+    assert len(drape.cloth.designed) < len(drape.cloth.flat)
+    data = {"form": "skirt", "mannequin": {"size": "EU 38", "resolution_mm": 40.0}, "drape": {"max_steps": 1}}
+    casing = [{"kind": "casing", "edge": "waist", "elastic": 0.95}]
+    scene = make_scene({**data, "finishing": casing}, name="skirt", folder=tmp_path, where="skirt")
+    session = Session(scene, AtOnce())
+    session.begin()
+    session.ask_drape()
+    assert session.step.drape is not None, session.error
+    assert session.step.drape.threaded
+
+
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
 def test_a_scene_survives_writing(path: Path) -> None:
     data = tomllib.loads(path.read_text(encoding="utf-8"))

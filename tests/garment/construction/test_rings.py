@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from bodies import body_of_size
 
+from warpflat.app.cli.tables import rings_line
 from warpflat.core.arrays import FloatArray
 from warpflat.garment.construction.girths import pattern_girths
-from warpflat.garment.construction.rings import GarmentRing, measure_rings, rings_line
+from warpflat.garment.construction.rings import GarmentRing, measure_rings
 from warpflat.garment.mannequin.darts import FormDart
 from warpflat.garment.mannequin.forms import Form, FormResult, PieceRecipe, shipped_form
 from warpflat.garment.mannequin.mannequin import Mannequin

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -26,6 +27,7 @@ from warpflat.garment.draping.lift import read_lift, whole_lifts
 from warpflat.garment.draping.mesh_pieces import mesh_pieces
 from warpflat.garment.draping.moved_pattern import moved_outlines
 from warpflat.garment.draping.options import DrapeOptions
+from warpflat.garment.draping.result import Drape
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.piece_parts import Dart, Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
@@ -363,13 +365,27 @@ def test_a_half_is_lifted_to_both_sides_of_its_surface(tmp_path: Path):
     np.testing.assert_allclose(found, asked, atol=5e-5)
 
 
-def test_a_pattern_from_outside_is_let_out_where_it_is_stretched_too_far():
+@pytest.fixture(scope="module")
+def narrow_tube() -> tuple[Pattern, Drape]:
     """A tube of 88 cm on a hip of 96 cm, in a cloth that gives 5 %."""
     narrow = tube(0.44, 0.2)
     draped, _ = drape_pattern(
         narrow, body_of_size(40.0), fabric=warpflat.find_fabric("woven"), device=DEVICE,
         placement=Placement(top="hip", spacing=0.04), options=DrapeOptions(max_steps=3000, tolerance=0.05),
     )  # fmt: skip
+    return narrow, draped
+
+
+def test_what_an_elastic_holds_stays_while_a_pattern_is_let_out(narrow_tube: tuple[Pattern, Drape]) -> None:
+    draped = replace(narrow_tube[1], threaded=["front.e3", "back.e3"])
+    found = relieve_pattern(draped, rounds=1)
+    rows = np.concatenate([draped.cloth.lines[line] for line in draped.threaded])
+    assert len(found.rounds) == 2
+    np.testing.assert_allclose(found.after.positions[rows], draped.positions[rows], atol=1e-6)
+
+
+def test_a_pattern_from_outside_is_let_out_where_it_is_stretched_too_far(narrow_tube: tuple[Pattern, Drape]) -> None:
+    narrow, draped = narrow_tube
     assert draped.converged
     found = relieve_pattern(draped)
     assert found.rounds[0].strained > 0.1

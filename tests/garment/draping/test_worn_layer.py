@@ -14,14 +14,12 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.flat.surface.connectivity import border_loops, join_labels
 from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.triangles import triangulate
 from warpflat.garment.construction.details import FinishingTable, PocketTable
 from warpflat.garment.construction.form_garment import FormGarment, flatten_form
 from warpflat.garment.construction.to_pattern import pattern_of_garment
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.continue_pieces import continue_pieces, hood_beside_head
 from warpflat.garment.draping.drape_pattern import Placement, drape_pattern, place_drafted
-from warpflat.garment.draping.lift import surface_lift
 from warpflat.garment.draping.mesh_pieces import mesh_pieces
 from warpflat.garment.draping.moved_pattern import moved_outlines
 from warpflat.garment.draping.options import DrapeOptions
@@ -535,11 +533,7 @@ def placed_on(form: str, *, turned: bool = False, **more: object) -> tuple[FormG
         lines = [{name: line[::-1] for name, line in reversed(p.internal_lines.items())} for p in pattern]
         pieces = [replace(piece, internal_lines=own) for piece, own in zip(pattern, lines, strict=True)]
         pattern = replace(pattern, pieces={"": pieces})
-    lifts = {
-        name: surface_lift(flat.surface.vertices[flat.vertex_origin], flat.positions, triangulate(flat.faces)[0])
-        for name, flat in garment.pieces.items()
-    }
-    return garment, place_drafted(pattern, lifts, mannequin, next(iter(garment.pieces.values())).fabric)
+    return garment, place_drafted(pattern, garment)
 
 
 def test_a_flounce_falls_from_its_edge_and_a_waistband_stands_on_it():

@@ -12,7 +12,6 @@ from self_intersections import self_intersections
 
 from warpflat.core.errors import InputError
 from warpflat.garment.mannequin.blend import Adjustment, adjusted_vertices, bridge_rows
-from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.darts import standard_darts
 from warpflat.garment.mannequin.forms import Form, PieceRecipe, form_from_mapping, form_names
 from warpflat.garment.mannequin.mannequin import Mannequin
@@ -391,8 +390,8 @@ def test_a_dart_of_another_piece_does_not_stand_for_one_that_a_seam_takes_over()
     layout, vertices = body_of_size(30.0).layout, body_of_size(30.0).vertices
     recipes = {"bodice": ("shoulder-waist/front-*",), "skirt": ("waist-knee/front-*",)}
     form = Form(name="x", pieces={name: PieceRecipe(bricks=bricks) for name, bricks in recipes.items()})
-    bricks = {name: select_bricks(layout, piece.bricks) for name, piece in form.pieces.items()}
-    form = replace(form, darts=standard_darts(layout, bricks))
-    gone = taken_over(layout, vertices, form, princess_seams(layout, bricks["bodice"], "bodice"))
+    built = body_of_size(30.0).form(form)
+    form = replace(form, darts=standard_darts(layout, built.bricks))
+    gone = taken_over(layout, vertices, form, princess_seams(layout, built.bricks["bodice"], "bodice"))
     assert {dart.name for dart in gone if dart.piece == "bodice"} == {"bust dart", "waist dart"}
     assert {dart.piece for dart in gone} == {"bodice"}

@@ -391,7 +391,7 @@ def test_limbs_agree_with_tapes_laid_without_the_package_with_arms_level() -> No
     told = body.metrics()["measures"]
     assert 0.004 < told["hip"]["girth_m"] - told["hip, legs together"]["girth_m"] < 0.015
     assert told["head"]["girth_over_size_m"] < 0.0
-    text = measures_table(body.measures, body.measure_difference())
+    text = measures_table(body)
     assert max(len(row) for row in text.splitlines()) <= 100
     assert next(row for row in text.splitlines() if row.startswith("calf left")).endswith("cm")
 
@@ -456,7 +456,7 @@ def test_a_scan_is_compared_with_the_nearest_size() -> None:
         found = told["levels"][level]
         assert found["girth_over_size_m"] == pytest.approx(found["girth_m"] - size.lengths[level])
         assert found["height_over_size_m"] == pytest.approx(found["height_m"] - size.heights[level])
-    text = mannequin_table(body.source, body.levels(), body.size_difference())
+    text = mannequin_table(body)
     assert f"nearest size {told['nearest_size']}" in text
     row = next(line for line in text.splitlines() if line.startswith("hip"))
     assert f"{100 * told['levels']['hip']['girth_over_size_m']:+.1f} cm" in row

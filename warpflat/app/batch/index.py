@@ -80,7 +80,6 @@ class BatchIndex:
                     *(row.seconds, row.memory_mb, row.message),
                 ]
             )
-        levels = _levels(rows)
         statuses = [f'<span class="{_COLOURS.get(row.status, "")}">{row.status}</span>' for row in rows]
         pictures = []
         for row in rows:

@@ -15,6 +15,7 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from warpflat._version import __version__
+from warpflat.app.scene.as_toml import laid_over
 from warpflat.app.scene.load import Scene, errors_named, expand_variables, make_scene
 from warpflat.app.scene.schema import PATH_KEYS
 from warpflat.core import InputError, Table, check_table, file_digest, quote_value, read_toml, with_plain_letters
@@ -40,7 +41,7 @@ class BodyTable(MannequinTable):
     @property
     def label(self) -> str:
         """The name of the body in the index."""
-        return self.name or (self.size_name if self.scan is None else Path(self.scan).stem)
+        return self.name or super().label
 
     def as_mannequin(self) -> dict[str, Any]:
         """Return the `[mannequin]` table of a scene."""
@@ -185,20 +186,15 @@ def _make_task(
             data = data | {"mannequin": body}
         if entry.fabric is not None:
             data = data | {"fabric": entry.fabric}
-        data = _merge(data, _with_absolute_paths(entry.override, folder))
+        data = laid_over(data, _with_absolute_paths(entry.override, folder), joins=False)
         scene = make_scene(data, name=name, folder=folder, where=where)
         settings = scene.settings
         # The key is a hash of the version, the resolved scene, and the contents of the files that it names. Digests stand
         # for paths: a file that is moved leaves the key as it is, a file that changes does not.
         named = _map_paths(settings.model_dump(mode="json"), lambda file: digest(Path(file)))
         text = json.dumps([__version__, scene.name, named], sort_keys=True)
-        if entry.body is not None:
-            label = entry.body.label
-        elif settings.mannequin is None:
-            label = ""
-        else:
-            scan = settings.mannequin.scan
-            label = settings.mannequin.size_name if scan is None else Path(scan).stem
+        body_table = entry.body or settings.mannequin
+        label = "" if body_table is None else body_table.label
         fabric = settings.fabric if isinstance(settings.fabric, str) else "own"
         # Who looks into the folder finds a task by its words; the digits tell apart what they leave out.
         words = "-".join(filter(None, (scene.name, label, fabric)))
@@ -239,15 +235,6 @@ def _path(file: str, folder: Path) -> str:
 def _table(data: Mapping[str, Any], key: str) -> Mapping[str, Any]:
     found = data.get(key)
     return found if isinstance(found, Mapping) else {}
-
-
-def _merge(data: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Return tables with those of `over` merged in."""
-    merged = dict(data)
-    for key, value in over.items():
-        below = merged.get(key)
-        merged[key] = _merge(below, value) if isinstance(below, Mapping) and isinstance(value, Mapping) else value
-    return merged
 
 
 def _label(override: Mapping[str, Any]) -> str:

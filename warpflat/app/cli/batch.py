@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from warpflat.app.cli.options import DONE, EXIT_CODES, FAULTY, ComputingCommand, tell
+from warpflat.app.cli.options import DONE, EXIT_CODES, FAULTY, ComputingCommand, out_option, tell
 
 __all__ = ["batch"]
 
@@ -32,7 +32,7 @@ _BAR = "{desc}: {n_fmt}/{total_fmt} tasks |{bar:20}| [{elapsed}, {remaining} lef
 
 @click.command(cls=ComputingCommand, epilog=f"{_FILES}\n\n{EXIT_CODES}")
 @click.argument("file", metavar="BATCH.toml", type=click.Path(path_type=Path))
-@click.option("--out", "-o", type=click.Path(path_type=Path), metavar="DIR", help="Folder.  [default: out/NAME]")
+@out_option("Folder.  [default: out/NAME]")
 @click.option(
     "--workers", type=click.IntRange(1, 1000), default=1, metavar="N", help="Processes on this machine.  [default: 1]"
 )

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import get_args
 
 import click
 
-from warpflat.app.cli.options import DONE, ComputingCommand, tell_files
+from warpflat.app.cli.options import DONE, ComputingCommand, out_option, tell_files
+from warpflat.app.scene.options import Dialect, Paper, PatternFormat, PrintedUnit
 
 __all__ = ["export"]
 
@@ -16,15 +18,15 @@ __all__ = ["export"]
 @click.option(
     "--format",
     "formats",
-    type=click.Choice(["dxf", "svg", "pdf", "json", "garmentcode", "plt"]),
+    type=click.Choice(get_args(PatternFormat)),
     multiple=True,
     required=True,
     help="Which.",
 )
-@click.option("--dialect", type=click.Choice(["aama", "astm"]), default="aama", show_default=True, help="Of the DXF.")
+@click.option("--dialect", type=click.Choice(get_args(Dialect)), default="aama", show_default=True, help="Of the DXF.")
 @click.option(
     "--paper",
-    type=click.Choice(["A4", "Letter", "A0", "Projector"]),
+    type=click.Choice(get_args(Paper)),
     default="A4",
     show_default=True,
     help="Of the PDF.",
@@ -39,16 +41,10 @@ __all__ = ["export"]
 )
 @click.option(
     "--units",
-    type=click.Choice(["mm", "cm", "in"]),
+    type=click.Choice(get_args(PrintedUnit)),
     help="Of lengths that are printed; in: of the DXF, too.  [default: cm]",
 )
-@click.option(
-    "--out",
-    "-o",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Folder for the files.  [default: the run's, or out/NAME of another program's file]",
-)
+@out_option("Folder for the files.  [default: the run's, or out/NAME of another program's file]")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes.")
 def export(
     source: Path,

@@ -80,8 +80,7 @@ _FILES = """\b
 @scene_options("fabric", "shear_limit")
 @scene_option("bands", help="As for warpflat flatten.")
 @scene_option("name", help="Name of the files.  [default: the garment's]")
-@scene_option("output.frames")
-@click.option("--no-picture", is_flag=True, help="Write no pictures, and no review.html, which shows them.")
+@scene_options("output.frames", "output.picture")
 @output_options(folder="out/NAME-fitted", printed="fit.json")
 def fit(
     garment: Path,
@@ -110,16 +109,17 @@ def fit(
     from warpflat.app.cli.progress_bar import ProgressBar
     from warpflat.app.scene.fit import (
         STUDY_FILES,
-        Carried,
-        FitJob,
         Fitted,
         check_tables,
         ease_wishes,
         fit_to,
+        keeps_pattern,
+        read_job,
         study_table,
         write_study,
     )
     from warpflat.app.scene.options import scene_tables
+    from warpflat.garment import Carried
 
     ease = ease_wishes(eases)
     if len(set(bodies)) < len(bodies):
@@ -135,13 +135,10 @@ def fit(
     # The carried mesh is one of its own, with its unit.
     of_file = dict.fromkeys(("units", "prim", "name"))
     tables = scene_tables({**options, **of_file, "cut_seam": tuple(cuts)})
-    tables["output"] = {"picture": not options["no_picture"], **tables.get("output", {})}
     check_tables(tables, garment, drawn)
     refuse_to_replace_others(folder, STUDY_FILES)
     start_warp_silently()
-    job = FitJob.start(
-        garment, units=options["units"], prim=options["prim"], name=name, front=options["front"], body=body
-    )
+    job = read_job(garment, units=options["units"], prim=options["prim"], name=name, front=options["front"], body=body)
     # Every body is built before the first pattern, so that a wrong one is refused at once.
     sources, carried = list(job.sources), list[Carried]()
     with listening_to_reads(sources.append):
@@ -156,7 +153,7 @@ def fit(
             result = fit_to(job, one, tables, to, name=name, device=output.device, on_progress=bar)
         kept = (
             [f"its own pattern is kept, and graded by the growth of the cloth; {_ANEW}"]
-            if job.keeps_pattern(tables)
+            if keeps_pattern(job, tables)
             else []
         )
         told = [*([*job.notes, *kept] if output.tells and one is carried[0] else ()), *one.notes]

@@ -36,8 +36,7 @@ _CUT = re.compile(r"(?:(?P<name>[^:=]*)=)?\s*(?P<way>points|line|plane|edges|mar
     help="Where a tube, such as a sleeve or a skirt, is cut open: two vertices A,B, one on each border, or a line of the file.  "
     "[default: where its borders are nearest]",
 )
-@scene_options("start", "output.frames")
-@click.option("--no-picture", is_flag=True, help="Write no pictures, and no review.html, which shows them.")
+@scene_options("start", "output.picture")
 @output_options()
 def flatten(
     mesh: Path,
@@ -71,7 +70,6 @@ def flatten(
         options["component"] = int(options["component"])
     tables = scene_tables(options)
     tables["surface"] = {"file": str(mesh), **tables.get("surface", {})}
-    tables["output"] = {"picture": not options["no_picture"], **tables.get("output", {})}
     pieces: dict[str, dict[str, Any]] = {}
     for option, values in (("--datum", datum), ("--open", openings), ("--grain-angle", grain_angle)):
         for value in values:

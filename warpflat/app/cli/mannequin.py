@@ -9,11 +9,11 @@ from typing import Any
 
 import click
 
-from warpflat.app.cli.options import DONE, ComputingCommand, measure_option, tell
+from warpflat.app.cli.options import DONE, ComputingCommand, measure_option, out_option, tell
 from warpflat.app.cli.run import start_warp_silently
 from warpflat.core import InputError, require_memory_for_usd
 
-__all__ = ["mannequin", "read_lengths"]
+__all__ = ["mannequin", "read_lengths", "sized_body"]
 
 
 @click.command(cls=ComputingCommand)
@@ -34,7 +34,7 @@ __all__ = ["mannequin", "read_lengths"]
 @click.option(
     "--resolution", type=click.FloatRange(2, 40), metavar="MM", help="Wished edge of the quads.  [default: 10]"
 )
-@click.option("--out", "-o", type=click.Path(path_type=Path), metavar="DIR", help="[default: out/mannequin]")
+@out_option("[default: out/mannequin]")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes.")
 @click.option("--json", "as_json", is_flag=True, help="Print metrics.json on standard output, nothing else.")
 def mannequin(
@@ -77,10 +77,7 @@ def mannequin(
         tables["pose"] = "scan"
     if tables.pop("keep_sides", False):
         tables["symmetric"] = False
-    if size is not None:
-        tables["size"] = size
-    if measures:
-        tables["measurements"] = read_lengths(measures, "--measure")
+    tables |= sized_body(size, measures)
     if landmarks:
         tables["landmarks"] = read_lengths(landmarks, "--landmark")
     if resolution is not None:
@@ -97,11 +94,17 @@ def mannequin(
     elif not quiet:
         for note in body.notes:
             tell(f"note: {note}")
-        click.echo(mannequin_table(body.source, body.levels(), body.size_difference()))
-        if (over := body.measure_difference()) is not None:
-            click.echo(f"\n{measures_table(body.measures, over)}\n")
+        click.echo(mannequin_table(body))
+        if tapes := measures_table(body):
+            click.echo(f"\n{tapes}\n")
         click.echo(f"{folder}: {', '.join(file.name for file in files.values())}")
     return DONE
+
+
+def sized_body(size: str | None, measures: Sequence[str]) -> dict[str, Any]:
+    """Return the table of the body that --size and --measure give; empty without them."""
+    lengths = {"measurements": read_lengths(measures, "--measure")} if measures else {}
+    return lengths if size is None else {"size": size, **lengths}
 
 
 def read_lengths(texts: Sequence[str], option: str) -> dict[str, float]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from warpflat.app.cli.options import DONE, FAULTY, ComputingCommand, tell_files
+from warpflat.app.cli.options import DONE, FAULTY, ComputingCommand, out_option, tell_files
 
 __all__ = ["marker"]
 
@@ -78,13 +78,7 @@ Exit codes:
     show_default=True,
     help="To search: a longer search finds shorter lays.",
 )
-@click.option(
-    "--out",
-    "-o",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Folder for the files.  [default: the run's, or out/NAME]",
-)
+@out_option("Folder for the files.  [default: the run's, or out/NAME]")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes.")
 @click.option(
     "--json", "as_json", is_flag=True, help="Print the measures of the markers on standard output, nothing else."

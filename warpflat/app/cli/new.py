@@ -117,12 +117,7 @@ def _draw_card(card: Path, garment: str, tables: Mapping[str, Any], body: Mappin
     """Draw what to measure for a garment, on the body of a table, or on that of a size where it says nothing."""
     from warpflat.app.scene.style import covered_bands
     from warpflat.core import check_table
-    from warpflat.garment import (
-        MannequinTable,
-        mannequin_from_table,
-        needed_measurements,
-        write_measurement_card,
-    )
+    from warpflat.garment import MannequinTable, mannequin_from_table, write_measurement_card
 
     if card.exists() or card.is_symlink():
         raise InputError(f"{card}: exists and is kept; name another file")
@@ -136,7 +131,7 @@ def _draw_card(card: Path, garment: str, tables: Mapping[str, Any], body: Mappin
     guessed = {note.split(" = ")[0] for note in mannequin.notes} - set(body.get("measurements", ()))
     card.parent.mkdir(parents=True, exist_ok=True)
     write_measurement_card(
-        card, mannequin, needed_measurements(covered_bands(tables), hood=hood), title=f"What to measure: {garment}",
+        card, mannequin, covered_bands(tables), hood=hood, title=f"What to measure: {garment}",
         values=mannequin.lengths if body else None, guessed=guessed,
     )  # fmt: skip
     click.echo(f"wrote {card}: what to measure for {garment}, and where")
@@ -144,13 +139,9 @@ def _draw_card(card: Path, garment: str, tables: Mapping[str, Any], body: Mappin
 
 def _body_table(size: str | None, measures: tuple[str, ...], scan: Path | None, file: Path) -> dict[str, Any]:
     """Return the table of the body, as a scene in a file has it."""
-    from warpflat.app.cli.mannequin import read_lengths
+    from warpflat.app.cli.mannequin import sized_body
 
-    table: dict[str, Any] = {}
-    if size is not None:
-        table["size"] = size
-    if measures:
-        table["measurements"] = read_lengths(measures, "--measure")
+    table = sized_body(size, measures)
     if scan is not None:
         # Scenes start from their own folder.
         table["scan"] = Path(os.path.relpath(scan, file.parent)).as_posix()

@@ -23,6 +23,7 @@ __all__ = [
     "ComputingCommand",
     "Output",
     "measure_option",
+    "out_option",
     "output_options",
     "scene_option",
     "scene_options",
@@ -80,9 +81,16 @@ def measure_option() -> Callable[[Command], Command]:
     return click.option("--measure", "measures", multiple=True, metavar="NAME=LENGTH", help=words)
 
 
+def out_option(words: str) -> Callable[[Command], Command]:
+    """Return the option of the folder into which a command writes; `words` tell its default."""
+    return click.option("--out", "-o", type=click.Path(path_type=Path), metavar="DIR", help=words)
+
+
 def scene_option(key: str, *, help: str = "") -> Callable[[Command], Command]:
     """Add the option of a command that sets a key of a scene; `help` replaces what it says of itself."""
     option = SCENE_OPTIONS[key]
+    if option.kind is bool:
+        return click.option(option.name, flag_value=False, default=None, help=help or option.help)
     return click.option(
         option.name,
         type=option.kind if isinstance(option.kind, type) else click.Choice(option.kind),
@@ -171,13 +179,7 @@ def output_options(
         verbose: whether there is more to print.
     """
     options: list[Callable[[Command], Command]] = [
-        click.option(
-            "--out",
-            "-o",
-            type=click.Path(path_type=Path),
-            metavar="DIR",
-            help=f"Folder for the files.  [default: {folder}]",
-        ),
+        out_option(f"Folder for the files.  [default: {folder}]"),
         click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes and warnings."),
         click.option(
             "--verbose",

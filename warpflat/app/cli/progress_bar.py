@@ -6,7 +6,6 @@ import math
 import sys
 import threading
 from contextlib import ExitStack
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from warpflat.core import activity_listener
@@ -55,9 +54,7 @@ class ProgressBar:
             threading.Thread(target=self._tick, name="warpflat-bar", daemon=True).start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._listening.close()
         self._ended.set()
         if self._bar is not None:

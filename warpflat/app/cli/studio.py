@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -99,14 +99,12 @@ def scene_of_mesh(mesh: Path, *, units: str | None = None, fabric: str | None = 
         InputError: there is no such file, or it has no unit and none is given.
     """
     from warpflat.app.scene.load import make_scene
+    from warpflat.app.scene.options import scene_tables
     from warpflat.app.scene.surface import scene_surface
     from warpflat.core import make_file_name
 
-    tables: dict[str, Any] = {"surface": {"file": mesh.name}}
-    if units is not None:
-        tables["surface"]["units"] = units
-    if fabric is not None:
-        tables["fabric"] = fabric
+    tables = scene_tables({"units": units, "fabric": fabric})
+    tables["surface"] = {"file": mesh.name, **tables.get("surface", {})}
     made = make_scene(tables, name=make_file_name(mesh.stem), folder=mesh.parent, where=str(mesh))
     # Before a page is opened: what is wrong with the file is one line here.
     scene_surface(made)

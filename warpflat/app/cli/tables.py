@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
-from warpflat.app.review.figures import seam_figures
+from warpflat.app.review.figures import relaxation_words, seam_figures
 from warpflat.core import aligned, energy_words
 from warpflat.flat import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_names
 
 if TYPE_CHECKING:
     from warpflat.flat import Ledger
-    from warpflat.garment import Level, ScanMeasure, SizeDifference
+    from warpflat.garment import Mannequin
 
 __all__ = [
     "drape_lines",
@@ -24,6 +24,7 @@ __all__ = [
     "ledger_table",
     "mannequin_table",
     "measures_table",
+    "rings_line",
     "run_summary",
 ]
 
@@ -60,8 +61,6 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
             )
         )
     tables = [aligned(head, rows)]
-    from warpflat.flat import relaxation_words
-
     if relaxed := relaxation_words(piece["stages"] for piece in metrics["pieces"].values()):
         tables.append(f"relaxed: {relaxed}")
     if metrics.get("seams"):
@@ -101,8 +100,6 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
             )
         tables.append(f"girths [cm], body / form / pattern (ease): {'; '.join(parts)}")
     if metrics.get("rings"):
-        from warpflat.garment import rings_line
-
         tables.append(rings_line(metrics["rings"]))
     if len(metrics.get("cloths", ())) > 1:
         # What is cut from each of several cloths.
@@ -114,6 +111,19 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
     if taken := metrics.get("pattern_of_file"):
         tables.append(f"pattern: {cut_words(taken)}")
     return "\n\n".join(tables) + f"\n{shlex.quote(folder)}: {', '.join(files)}"
+
+
+def rings_line(rings: Sequence[Mapping[str, Any]]) -> str:
+    """Return the console's line about the entry `rings` of `metrics.json`."""
+    shut = [
+        f"{ring['name']} {ring['opening_needed_mm'] / 10:g} cm ({ring['length_mm'] / 10:.1f} < {ring['over']} {ring['girth_mm'] / 10:.1f})"
+        for ring in rings
+        if ring["passes"] is False
+    ]
+    unknown = [ring["name"] for ring in rings if ring["passes"] is None]
+    parts = [f"need an opening: {', '.join(shut)}"] if shut else []
+    parts += [f"not known: {', '.join(unknown)}"] if unknown else []
+    return f"rings: {'; '.join(parts) or f'all {len(rings)} pass'}"
 
 
 def cut_words(taken: Mapping[str, Any]) -> str:
@@ -142,14 +152,9 @@ def drape_lines(metrics: Mapping[str, Any]) -> list[str]:
     return [first, *(f"  {place['words']}" for place in drape["places"] if place["words"] not in told)]
 
 
-def mannequin_table(source: str, levels: Mapping[str, Level], difference: SizeDifference | None = None) -> str:
-    """Return height and girth of every level as text, from the neck down.
-
-    Args:
-        source: of the body.
-        levels: by name.
-        difference: of a scan to the nearest size.
-    """
+def mannequin_table(body: Mannequin) -> str:
+    """Return height and girth of every level of a body as text, from the neck down; of a scan beside those of the nearest size."""
+    source, levels, difference = body.source, body.levels(), body.size_difference()
     head = ["level", "height", "girth"]
     rows = [[name, f"{100 * level.height:.1f} cm", f"{100 * level.girth:.1f} cm"] for name, level in levels.items()]
     if difference is not None:
@@ -161,20 +166,18 @@ def mannequin_table(source: str, levels: Mapping[str, Level], difference: SizeDi
     return f"{source}\n{aligned(head, rows)}"
 
 
-def measures_table(measures: Mapping[str, ScanMeasure], difference: SizeDifference) -> str:
-    """Return the tapes around a scan as text, from the head down.
-
-    Args:
-        measures: by name.
-        difference: of the measures to the nearest size.
-    """
+def measures_table(body: Mannequin) -> str:
+    """Return the tapes around a scan as text, from the head down, beside those of the nearest size; "" without a scan."""
+    difference = body.measure_difference()
+    if difference is None:
+        return ""
     head = ("tape around the scan", "height", "girth", "height over size", "girth over size", "place")
     rows = [
         (
             name, f"{100 * m.height:.1f} cm", f"{100 * m.girth:.1f} cm", _more(difference.heights, name),
             _more(difference.girths, name), "" if m.guess is None else "guess",
         )
-        for name, m in measures.items()
+        for name, m in body.measures.items()
     ]  # fmt: skip
     return aligned(head, rows)
 

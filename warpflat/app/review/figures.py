@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
-__all__ = ["count_pieces", "seam_figures"]
+from warpflat.core import energy_words, format_count
+
+__all__ = ["count_pieces", "relaxation_words", "seam_figures"]
 
 
 def count_pieces(metrics: Mapping[str, Any]) -> int:
@@ -23,3 +26,31 @@ def seam_figures(seam: Mapping[str, Any]) -> tuple[str, str, str, str]:
     ease = f"{100 * seam['ease']:+.3g} %" if seam["ease"] else ""
     # Without the sign of a negative zero.
     return first, second, ease, f"{round(seam['difference_mm'], 2) + 0.0:+.2f} mm"
+
+
+def relaxation_words(pieces: Iterable[Sequence[Mapping[str, Any]]]) -> str:
+    """Return how many of the paper's steps and how many iterations of L-BFGS relaxed pieces first, and what energy each released.
+
+    Args:
+        pieces: for each the entries of its history, as `Stage.as_dict` has them.
+
+    Returns:
+        Such as "36 steps released 2.3 J, 301 iterations 120 mJ"; empty where nothing was relaxed.
+    """
+    counts: dict[str, int] = {}
+    released: dict[str, float] = {}
+    for stages in pieces:
+        for before, stage in pairwise(stages):
+            if before["name"] not in ("develop", "steps") or stage["name"] not in ("steps", "relax"):
+                break
+            # A step is a unit of work, an iteration several.
+            unit = "step" if stage["work_units"] <= stage["steps"] else "iteration"
+            counts[unit] = counts.get(unit, 0) + stage["steps"]
+            # The energy of crushed faces is beyond all numbers.
+            if None not in (before["model_energy_j"], stage["model_energy_j"]):
+                released[unit] = released.get(unit, 0.0) + before["model_energy_j"] - stage["model_energy_j"]
+    return ", ".join(
+        f"{format_count(counts[unit], unit)} released {energy_words(released.get(unit, 0.0))}"
+        for unit in ("step", "iteration")
+        if counts.get(unit)
+    )

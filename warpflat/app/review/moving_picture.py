@@ -48,7 +48,6 @@ def write_moving_pictures(folder: Path, *, film: bool, sheet: bool) -> list[str]
     _, files, name = read_run(folder)
     if "frames.usdc" not in files:
         raise InputError(f"{folder}: has no frames.usdc of this run; run the scene with frames above 0")
-    written = []
     asked = [file for file, wanted in (("film.webp", film), ("contact_sheet.png", sheet)) if wanted]
     with output_folder(folder, asked, guard=True), reading(folder / "frames.usdc", "film", noted=False):
         pieces = open_film(folder / "frames.usdc")
@@ -56,7 +55,6 @@ def write_moving_pictures(folder: Path, *, film: bool, sheet: bool) -> list[str]
             images = _images(pieces, _evenly(pieces[0].times, _FRAMES), _LONG_SIDE)
             each = round(1000 * len(pieces[0].times) / FRAME_RATE / len(images))
             write_moving_picture(folder / "film.webp", images, each=each, last=1500)
-            written.append("film.webp")
         if sheet:
             columns, rows = _SHEET
             images = _images(pieces, _evenly(pieces[0].times, columns * rows), _SHEET_SIDE)
@@ -66,10 +64,9 @@ def write_moving_pictures(folder: Path, *, film: bool, sheet: bool) -> list[str]
                 page.paste(image, (number % columns * cell[0], number // columns * cell[1]))
             with atomic_path(folder / "contact_sheet.png") as temporary:
                 page.save(temporary, format="PNG")
-            written.append("contact_sheet.png")
-        for file in written:
+        for file in asked:
             record_file(folder, name, file)
-    return written
+    return asked
 
 
 def _evenly(times: Sequence[int], most: int) -> list[int]:

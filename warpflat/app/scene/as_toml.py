@@ -56,15 +56,16 @@ def _value(value: Any, digits: int | None = None) -> str:
     return repr(value) if digits is None else f"{value:.{digits}g}"
 
 
-def laid_over(base: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a table with another one laid over it: tables are merged, lists of tables put together, other values replaced."""
+def laid_over(base: Mapping[str, Any], other: Mapping[str, Any], *, joins: bool = True) -> dict[str, Any]:
+    """Return a table with another one laid over it: tables are merged, lists of tables put together if it joins, other values replaced."""
     found = dict(base)
     for key, value in other.items():
         own = found.get(key)
         if isinstance(own, Mapping) and isinstance(value, Mapping):
-            found[key] = laid_over(own, value)
+            found[key] = laid_over(own, value, joins=joins)
         elif (
-            isinstance(own, list)
+            joins
+            and isinstance(own, list)
             and isinstance(value, list)
             and all(isinstance(each, Mapping) for each in (*own, *value))
         ):

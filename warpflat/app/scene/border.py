@@ -170,7 +170,6 @@ def _corners(surface: Surface, loop: IntArray, side: str) -> dict[str, int]:
     vector = area_vectors(surface.vertices, triangles)
     normal = np.stack([np.bincount(face, vector[:, k], minlength=len(surface.faces)) for k in range(3)], axis=1)
     away = normal @ towards < -_AWAY * np.linalg.norm(normal, axis=1)
-    sides = half_edges_of(surface)
     border = sides.count[sides.edge] == 1
     length = np.linalg.norm(surface.vertices[sides.head[border]] - surface.vertices[sides.tail[border]], axis=1)
     if float(length[away[sides.face[border]]].sum() / length.sum()) > _AWAY_SHARE:

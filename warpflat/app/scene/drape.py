@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,8 +14,8 @@ from warpflat.garment import Garment, garment_files
 from warpflat.pattern import pattern_names
 
 if TYPE_CHECKING:
-    from warpflat.flat import Flattening
     from warpflat.garment import Drape
+    from warpflat.pattern import PatternOptions
 
 __all__ = ["drape_names", "drape_scene", "write_drape"]
 
@@ -40,7 +40,7 @@ def _corrected_formats(scene: Scene) -> list[str]:
 
 
 def write_drape(
-    scene: Scene, garment: Garment, folder: Path, *, device: str | None = None
+    scene: Scene, garment: Garment, folder: Path, *, drawing: PatternOptions, device: str | None = None
 ) -> tuple[dict[str, Any], list[str], tuple[str, ...]]:
     """Drape a scene's garment, and write its files.
 
@@ -48,6 +48,7 @@ def write_drape(
         scene: with a `[drape]` table.
         garment: flattened.
         folder: an existing one.
+        drawing: options of the pattern files.
         device: Warp device.
 
     Returns:
@@ -66,17 +67,13 @@ def write_drape(
     metrics, notes = {"drape": draped.measures()}, tuple[str, ...]()
     if table.correct or table.correct_fabric is not None:
         # Correct the pattern, and write it beside the first.
-        from warpflat.app.scene.pattern_options import pattern_options
         from warpflat.core import optional_file
         from warpflat.garment import correct_pattern
 
         report_activity("correcting the pattern")
         with errors_named(scene.where):
             other = fabric_of_correction(scene)
-            found = correct_pattern(
-                draped, hold=[*table.hold, *draped.threaded], fabric=other, worn_shape=other is not None
-            )
-            drawing = pattern_options(scene.settings.pattern, None, scene.settings.cloth)
+            found = correct_pattern(draped, hold=table.hold, fabric=other, worn_shape=other is not None)
         if output.picture:
             with optional_file(folder / "corrected.png", files) as path:
                 from warpflat.garment import write_correction_picture
@@ -84,7 +81,7 @@ def write_drape(
                 write_correction_picture(path, found)
         corrected = found.apply(garment)
         assert isinstance(corrected, Garment)
-        drawing = replace(drawing, formats=_corrected_formats(scene))
+        drawing = replace(drawing, formats=_corrected_formats(scene), cloth=None)
         written = garment_files({"": corrected}, folder, name=f"{scene.name}.corrected", options=drawing)
         metrics["drape"]["correction"] = found.measures(garment)
         files += written.files
@@ -92,12 +89,19 @@ def write_drape(
     return metrics, files, notes
 
 
-def drape_scene(scene: Scene, garment: Garment | Flattening, *, device: str | None = None) -> Drape:
-    """Drape a scene's garment or piece by the settings of its `[drape]` table, or by the defaults.
+def drape_scene(
+    scene: Scene,
+    garment: Garment,
+    *,
+    callback: Callable[[int, float], None] | None = None,
+    device: str | None = None,
+) -> Drape:
+    """Drape a scene's garment by the settings of its `[drape]` table, or by the defaults.
 
     Args:
         scene: the scene.
         garment: flattened.
+        callback: called with the number of steps and the residual now and then.
         device: Warp device.
 
     Raises:
@@ -110,5 +114,5 @@ def drape_scene(scene: Scene, garment: Garment | Flattening, *, device: str | No
     with errors_named(scene.where):
         return drape(
             garment, hold=table.hold, elastics=[each.edge for each in scene.settings.finishing if each.elastic],
-            options=table.options(), device=device or scene.settings.device,
+            options=table.options(), callback=callback, device=device or scene.settings.device,
         )  # fmt: skip

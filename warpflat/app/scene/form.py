@@ -6,7 +6,6 @@ from dataclasses import replace
 
 from warpflat.app.scene.cuts import cut_form
 from warpflat.app.scene.load import Scene, errors_named, scene_fabric
-from warpflat.app.scene.pulled_on import wide_enough
 from warpflat.garment import (
     Form,
     FormResult,
@@ -17,6 +16,7 @@ from warpflat.garment import (
     part_at_centres,
     shaped_form,
     shipped_form,
+    wide_enough,
 )
 
 __all__ = ["scene_form", "scene_mannequin", "scene_recipe"]

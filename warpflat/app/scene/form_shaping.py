@@ -21,9 +21,6 @@ from warpflat.garment import (
     Garment,
     closed_darts,
     crowded_darts,
-    place_darts,
-    select_bricks,
-    usual_darts,
 )
 
 __all__ = [
@@ -160,16 +157,15 @@ def without_closed_darts(scene: Scene, garments: Iterable[FormGarment]) -> tuple
         crowded += [
             d for d in crowded_darts(garment.form, garment.positions) if d.place not in own and d not in crowded
         ]
-        layout = garment.mannequin.layout
-        bricks = {name: select_bricks(layout, piece.bricks) for name, piece in garment.form.recipe.pieces.items()}
-        form = garment.form.vertices
-        usual = [dart for dart in usual_darts(layout, form, bricks) if dart.name == _SHOULDER["name"]]
-        armholes = form[np.concatenate([layout.lines[f"armhole {side}"] for side in ("left", "right")])]
+        form, lines = garment.form, garment.form.layout.lines
+        armholes = cKDTree(form.vertices[np.concatenate([lines[f"armhole {side}"] for side in ("left", "right")])])
         # Where a shoulder is narrow, a dart there would be as near to the armhole.
         movable |= {
-            dart.piece
-            for dart in place_darts(layout, form, bricks, usual)
-            if cKDTree(armholes).query(form[dart.row])[0].min() > NEAR_ARMHOLE + _SWING
+            piece
+            for dart in form.usual_darts()
+            if dart.name == _SHOULDER["name"]
+            for piece, row in form.dart_rows(dart)
+            if armholes.query(form.vertices[row])[0].min() > NEAR_ARMHOLE + _SWING
         }
     if scene.settings.shape != "darts":
         # A woven sleeve around a bent elbow has its dart in every shape.

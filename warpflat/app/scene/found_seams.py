@@ -42,7 +42,6 @@ def found_seams(scene: Scene) -> FoundSeams | None:
     """
     from warpflat.flat import object_parts
     from warpflat.garment import (
-        FILE_SEAMS,
         NO_PATTERN,
         SeamOptions,
         asked_seams,
@@ -60,7 +59,7 @@ def found_seams(scene: Scene) -> FoundSeams | None:
     is_silent = not is_asked and not drawn
     if not isinstance(table, FileSurface) or (asked.find == "none" and not (drawn or asked.keep)):
         return None
-    all_parts, of_file = table.component == "all", asked.find in ("file", *FILE_SEAMS)
+    all_parts, of_file = table.component == "all", asked.find not in ("auto", "none")
     of_one_piece = ("lines", "cuts", "auto_cut", "datum", "start", "constraints", "seams", "drape")
     if is_silent and (table.component not in (None, "all") or any(getattr(settings, key) for key in of_one_piece)):
         return None

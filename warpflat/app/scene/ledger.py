@@ -37,12 +37,9 @@ from warpflat.garment import (
     FormDart,
     Garment,
     Mannequin,
-    dart_along,
-    dart_rows,
     flatten_form,
     is_side,
     princess_seams,
-    usual_darts,
 )
 
 __all__ = ["candidate_cuts", "cuts_of_entry", "scene_ledger", "trial_of_scene", "try_cuts", "with_cut"]
@@ -123,7 +120,7 @@ def candidate_cuts(
         among: names of the pieces; all if not given.
         usual_only: the darts of a pattern book only.
     """
-    layout, bricks, form = plan.mannequin.layout, plan.bricks, plan.form
+    form = plan.form
     present = {dart.place for dart in form.recipe.darts}
     names = {(dart.piece, dart.name) for dart in form.recipe.darts}
     unsewn = {name: piece.unsewn or piece for name, piece in garment.pieces.items() if among is None or name in among}
@@ -131,25 +128,21 @@ def candidate_cuts(
 
     def priced(dart: FormDart) -> Iterator[tuple[dict[str, Any], Price]]:
         grid = form.pieces[dart.piece].grid_vertices
-        rows = [
-            laid[dart.piece].row_of(grid, row)
-            for piece, row in dart_rows(layout, form.vertices, bricks, dart)
-            if piece == dart.piece
-        ]
+        rows = [laid[dart.piece].row_of(grid, row) for piece, row in form.dart_rows(dart) if piece == dart.piece]
         if found := [row for row in rows if row is not None]:
             yield cut_of_dart(dart), laid[dart.piece].price(found)
 
-    for dart in usual_darts(layout, form.vertices, bricks):
+    for dart in form.usual_darts():
         if dart.place not in present and dart.piece in unsewn:
             yield from priced(dart if (dart.piece, dart.like) in names else replace(dart, like=None))
     if usual_only:
         return
     found: set[tuple[Any, ...]] = set()
-    for dart in (dart for name in unsewn for dart in princess_seams(layout, bricks[name], name)):
+    for dart in (dart for name in unsewn for dart in princess_seams(form.layout, form.bricks[name], name)):
         found.add((dart.piece, dart.line, dart.part))
         yield from priced(dart)
     for name, piece in unsewn.items():
-        if all(is_side(brick, "right") for brick in bricks[name]):
+        if all(is_side(brick, "right") for brick in form.bricks[name]):
             continue
         # From the border along lines to the peaks of its energy, and along whole lines.
         try:
@@ -161,7 +154,7 @@ def candidate_cuts(
                 continue
             row = form.pieces[name].grid_vertices[candidate.paths[0]]
             words = without_side(candidate.name.replace(",", ""))
-            along = dart_along(layout, form.vertices, bricks[name], row, piece=name, name=words)
+            along = form.dart_along(name, row, words)
             if along is not None and (key := (along.piece, along.line, along.part)) not in found:
                 found.add(key)
                 yield from priced(along)

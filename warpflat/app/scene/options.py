@@ -6,11 +6,21 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from warpflat.core import InputError, quote_value
 
-__all__ = ["COMMAND_LINE", "SCENE_OPTIONS", "SceneOption", "errors_of_options", "scene_tables"]
+__all__ = [
+    "COMMAND_LINE",
+    "SCENE_OPTIONS",
+    "Dialect",
+    "Paper",
+    "PatternFormat",
+    "PrintedUnit",
+    "SceneOption",
+    "errors_of_options",
+    "scene_tables",
+]
 
 #: What messages about a scene that was made from options begin with.
 COMMAND_LINE = "command line"
@@ -21,13 +31,20 @@ _KEY = re.compile(
 )
 
 
+#: Formats of pattern files, dialects of the DXF, papers of the PDF, and units of what is printed.
+PatternFormat = Literal["dxf", "svg", "pdf", "json", "garmentcode", "plt"]
+Dialect = Literal["aama", "astm"]
+Paper = Literal["A4", "Letter", "A0", "Projector"]
+PrintedUnit = Literal["mm", "cm", "in"]
+
+
 class SceneOption(NamedTuple):
     """An option of the command line that sets a key of a scene.
 
     Attributes:
         declaration: its name with its dashes, and what its value is called where `kind` does not list the values.
         help: what it does.
-        kind: of its value: text, a number, or one of several words.
+        kind: of its value: text, a number, one of several words, or `bool` of a switch, which sets the key to false.
         multiple: whether it may be given several times.
     """
 
@@ -137,6 +154,7 @@ SCENE_OPTIONS: Mapping[str, SceneOption] = {
         "A piece that would lie over itself is parted where its border is nearer than this; 0: not.  [default: 0.5]", float,
     ),
     "output.frames": SceneOption("--frames N", "About how many frames, 0 for none.  [default: 60]", int),
+    "output.picture": SceneOption("--no-picture", "Write no pictures, and no review.html, which shows them.", bool),
     "device": SceneOption("--device NAME", "Warp device, such as cpu or cuda:0.  [default: Warp's choice]"),
 }  # fmt: skip
 

@@ -7,23 +7,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
 from warpflat.app.scene.load import errors_named, expand_variables
 from warpflat.app.scene.run import SceneResult
 from warpflat.app.scene.schema import DrapeTable
-from warpflat.core import InputError, Table, check_table, format_count, make_file_name, read_json, read_toml
+from warpflat.core import InputError, Table, check_table, make_file_name, read_json, read_toml
 from warpflat.garment import MannequinTable, mannequin_from_table
 
 if TYPE_CHECKING:
-    from warpflat.garment import Correction, Lift, Mannequin
+    from warpflat.garment import Lift, Mannequin
     from warpflat.pattern import Pattern, Piece, Seam
 
-__all__ = ["BESIDE", "OutsideJob", "SewingTable", "drape_outside", "edge_table", "is_pattern_file"]
-
-#: A garment lies on a body if half of its cloth, or of its borders, is nearer to it than this [m].
-BESIDE = 0.2
+__all__ = ["OutsideJob", "SewingTable", "drape_outside", "edge_table", "is_pattern_file"]
 
 
 class SewnSeamTable(Table):
@@ -223,30 +219,13 @@ def edge_table(
 
 def _read(path: Path, table: SewingTable, units: str | None) -> tuple[Pattern, dict[str, Lift], Run]:
     """Return the pattern, the ways to its designed surface, and what its run says of body and girths."""
-    from warpflat.flat import SUFFIXES
-    from warpflat.garment import read_lift, surface_lift
-    from warpflat.pattern import read_pattern
+    from warpflat.garment import read_lifted
 
-    if path.suffix.lower() in SUFFIXES and not path.is_dir():
-        from warpflat.garment import read_cut_pattern
-
-        worn = read_cut_pattern(path, units=units, name=make_file_name(path.stem))
-        return worn.pattern, {name: surface_lift(*each) for name, each in worn.surfaces.items()}, Run()
-    if units is not None:
-        raise InputError(f"--units: is for a mesh whose texture is its pattern; {path} says its own")
     allowance = None if table.allowance_mm is None else 1e-3 * table.allowance_mm
-    folder = path if path.is_dir() else None
-    pattern = read_pattern(path / "pattern.json" if folder else path, allowance=allowance)
-    if folder is None:
-        return pattern, {}, Run()
-    lifts = {
-        piece.name: read_lift(folder / f"{piece.name}.obj")
-        for piece in pattern.pieces[pattern.sample]
-        if (folder / f"{piece.name}.obj").is_file()
-    }
-    if not (folder / "metrics.json").exists():
-        return pattern, lifts, Run()
-    return pattern, lifts, check_table(Run, read_json(folder / "metrics.json"), str(folder / "metrics.json"))
+    pattern, lifts = read_lifted(path, units=units, allowance=allowance)
+    told = path / "metrics.json"
+    run = check_table(Run, read_json(told), str(told)) if path.is_dir() and told.exists() else Run()
+    return pattern, lifts, run
 
 
 def _changed(piece: Piece, entry: SewnPieceTable | None) -> Piece:
@@ -293,9 +272,7 @@ def _worn_scan(
 
     Both come to the mannequin's axes together. None if the body is no scan, or the surface does not lie on it as their files stand.
     """
-    from scipy.spatial import cKDTree
-
-    from warpflat.garment import moved_lift
+    from warpflat.garment import lifts_on_scan
 
     asked = _asked(given, table)
     if asked is None or asked.scan is None:
@@ -306,20 +283,8 @@ def _worn_scan(
     except InputError:
         # The body as it is asked for may be one; if not, it says why.
         return None
-    assert body.placed is not None
-    assert body.scan is not None
-    turn, shift = body.placed
-    # The surface is in metres, whatever the scan's unit.
-    turn = turn / np.cbrt(np.linalg.det(turn))
-    moved = {name: moved_lift(lift, turn, shift) for name, lift in lifts.items()}
-    borders = [
-        moved[piece.name](edge.points)
-        for piece in pattern.pieces[pattern.sample]
-        if piece.name in moved
-        for edge in piece.edges
-    ]
-    far = cKDTree(body.scan[0]).query(np.concatenate(borders))[0]
-    return (body, moved) if np.median(far) <= BESIDE else None
+    moved = lifts_on_scan(body, lifts, pattern)
+    return None if moved is None else (body, moved)
 
 
 def _body(
@@ -381,7 +346,6 @@ def drape_outside(
         Placement,
         drape_pattern,
         files_of_drape,
-        moved_outlines,
         relieve_pattern,
         write_drape_files,
     )
@@ -416,27 +380,16 @@ def drape_outside(
                 from warpflat.garment import write_correction_picture
 
                 write_correction_picture(path, found)
-            chosen = pattern.sample if size is None else size
-            moved = moved_outlines(pattern, chosen, found.before.cloth, found.after.cloth)
+            moved = found.drawn(pattern, pattern.sample if size is None else size)
             drawing = PatternOptions(formats=("dxf", "svg"))
             written = write_pattern(lambda: (moved, ()), folder, name=f"{job.name}.corrected", options=drawing)
             files += written.files
-            more = [*more, *written.notes, _correction_words(found)]
+            more = [*more, *written.notes, found.describe()]
         files.append("metrics.json")
         body = {} if job.body is None else {"mannequin": job.body.metrics(), "girths": job.girths_on_body()}
         measured = run_metrics({}, wp.get_device(device), {**body, "drape": entry})
         metrics, stale = remove_stale(folder, measured, name=job.name, files=files, drape=True)
     return SceneResult(metrics=metrics, files=tuple(files), notes=(*pattern.notes, *notes, *more, *stale))
-
-
-def _correction_words(found: Correction) -> str:
-    """Return in a sentence what a correction has come to."""
-    first, last = found.rounds[0].strained, found.rounds[-1].strained
-    rounds = format_count(len(found.rounds) - 1, "round")
-    return (
-        f"corrected in {rounds}: {100 * first:.1f} % of the cloth was stretched beyond its limit, now {100 * last:.1f} % "
-        f"({found.reason})"
-    )
 
 
 def _fabric(job: OutsideJob, name: str | None) -> tuple[Any, Sequence[str]]:

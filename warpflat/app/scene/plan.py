@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from warpflat.app.scene.cuts import CutSequence, cut_of_dart, plan_automatic_cuts, plan_cuts
@@ -31,15 +31,12 @@ from warpflat.flat import (
     RelaxOptions,
     Surface,
     advise,
-    as_fabric,
     cut,
     cut_surfaces,
     flatten,
     flatten_all,
-    triangulate,
 )
 from warpflat.garment import (
-    CURVES_MM,
     GRAIN,
     Constraint,
     FormGarment,
@@ -55,15 +52,11 @@ from warpflat.garment import (
     cap_wishes,
     check_edge_names,
     check_fold_grain,
-    dart_along,
     find_fold_lines,
     flatten_form,
     garment_as_cut,
     name_seams,
     plan_form,
-    seam_ratios,
-    seam_words,
-    select_bricks,
     sew_pieces,
     sewn_centres,
     sized_opening,
@@ -253,7 +246,7 @@ class MeshPlan(Plan):
         if garment.sewn is not None or self.panels:
             for name, recorder in recorders.items():
                 recorder.record_result(garment.pieces[name])
-        found = () if self.found is None else (seam_words(self.found), *self.found.notes)
+        found = () if self.found is None else (self.found.describe(), *self.found.notes)
         return replace(
             garment, remarks=(*unsewn, *found, *(note for sequence in self.sequences for note in sequence.notes))
         )
@@ -341,12 +334,6 @@ class GarmentPlan(Plan):
             built = scene_form(self.scene, self.mannequin, strain_limit=scene_fabric(scene).strain_limit)
         return plan_garment(scene, device=self.device, built=built)
 
-    @cached_property
-    def bricks(self) -> dict[str, list[str]]:
-        """The bricks of every piece, on both sides of the body."""
-        recipe = self.form.recipe
-        return {name: select_bricks(self.mannequin.layout, piece.bricks) for name, piece in recipe.pieces.items()}
-
     def advise(self, piece: Flattening) -> Flattening:
         """Return a piece with cuts that would help, each with the table of a scene's `[[cuts]]` that makes it, if one can."""
         name, advised = piece.surface.name, advise(piece)
@@ -355,7 +342,7 @@ class GarmentPlan(Plan):
         for remedy in advised.remedies:
             row = cloth.grid_vertices[remedy.path]
             title = without_side(remedy.words.split(",")[0].removeprefix("a "))
-            dart = dart_along(self.mannequin.layout, self.form.vertices, self.bricks[name], row, piece=name, name=title)
+            dart = self.form.dart_along(name, row, title)
             table = None if dart is None or row[-1] in on_fold else cut_of_dart(dart)
             remedies.append(replace(remedy, table=table))
         return advised.with_remedies(remedies) if remedies else advised
@@ -368,13 +355,10 @@ class GarmentPlan(Plan):
 
     def place_drafted(self, garment: Garment, pattern: Pattern) -> Mapping[str, Sequence[Surface]]:
         """See :meth:`Plan.place_drafted`."""
-        from warpflat.garment import place_drafted, surface_lift
+        from warpflat.garment import place_drafted
 
-        lifts = {
-            name: surface_lift(flat.surface.vertices[flat.vertex_origin], flat.positions, triangulate(flat.faces)[0])
-            for name, flat in garment.pieces.items()
-        }
-        return place_drafted(pattern, lifts, self.mannequin, next(iter(garment.pieces.values())).fabric)
+        assert isinstance(garment, FormGarment)
+        return place_drafted(pattern, garment)
 
     @property
     def size(self) -> str:
@@ -575,8 +559,7 @@ def plan_garment(
         check_fold_grain(find_fold_lines(form, plan), settings.grain_angle)
     wishes = scene_wishes(settings.seams)
     with errors_named(f"{scene.where}: seams"):
-        seam_ratios(form, wishes)
-        wishes += cap_wishes(form, as_fabric(options["fabric"]), wishes)
+        wishes += cap_wishes(form, options["fabric"], wishes)
     with errors_named(scene.where):
         constraints = scene_constraints(
             settings.constraints,
@@ -594,5 +577,5 @@ def plan_garment(
         wishes=wishes,
         constraints=constraints,
         openings=openings,
-        settings={**options, "curves_mm": CURVES_MM if settings.curves_mm is None else settings.curves_mm},
+        settings=options if settings.curves_mm is None else {**options, "curves_mm": settings.curves_mm},
     )

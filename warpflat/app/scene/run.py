@@ -194,7 +194,9 @@ def _run(
             measured, fit_notes, remedies, worn = fit.result()
             garment = garment.advised(lambda part: part.with_remedies(remedies[part.surface.name]))
             with optional_step("it was not draped", of=StepError):
-                draped, drape_files, drape_notes = write_drape(scene, garment, folder, device=device)
+                draped, drape_files, drape_notes = write_drape(
+                    scene, garment, folder, drawing=plan.drawing, device=device
+                )
                 files = list(dict.fromkeys([*drape_files, *files]))
                 sizes[plan.size] = replace(sizes[plan.size], drape=draped["drape"])
         # What is ready is packed for the review while other processes write.

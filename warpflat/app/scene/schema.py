@@ -17,6 +17,7 @@ from pydantic import (
 )
 
 from warpflat.app.scene.first_shapes import PIECES
+from warpflat.app.scene.options import Dialect, Paper, PatternFormat, PrintedUnit
 from warpflat.core import Table, is_number, plain_name, quote_value
 from warpflat.flat import DEFAULT_FABRIC, AutoCutTable, FabricTable, RelaxOptions
 from warpflat.garment import (
@@ -391,17 +392,17 @@ class OutputTable(Table):
 class PatternTable(Table):
     """The pattern files: `NAME.dxf`, `NAME.svg`, `pattern.pdf`, `pattern.json`."""
 
-    formats: list[Literal["dxf", "svg", "pdf", "json", "garmentcode", "plt"]] = ["dxf", "svg", "pdf", "json"]  # noqa: RUF012 (pydantic copies)
+    formats: list[PatternFormat] = ["dxf", "svg", "pdf", "json"]  # noqa: RUF012 (pydantic copies)
     """Formats that are written; an empty list writes none."""
-    dialect: Literal["aama", "astm"] = "aama"
-    paper: Literal["A4", "Letter", "A0", "Projector"] = "A4"
+    dialect: Dialect = "aama"
+    paper: Paper = "A4"
     allowance_mm: Annotated[float, Field(ge=0, le=100)] = 10.0
     hem_mm: Annotated[float, Field(ge=0, le=200)] = 30.0
     kinds: dict[str, Literal["seam", "hem", "fold", "cut"]] = Field(default_factory=dict)
     """What an edge is, by its name: "front.neck", or "neck" for every piece that has one."""
     allowances_mm: dict[str, Annotated[float, Field(ge=0, le=200)]] = Field(default_factory=dict)
     """Allowances by edge, named as in `kinds` [mm]."""
-    units: Literal["mm", "cm", "in"] = "cm"
+    units: PrintedUnit = "cm"
     """Units of lengths in printed words."""
     names: dict[str, Annotated[str, Field(min_length=1, max_length=60)]] = Field(default_factory=dict)
     """What is printed instead of a piece's name: front_bodice = "Vorderteil"."""

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from warpflat.app.scene.cuts import cut_of_dart
-from warpflat.app.scene.form import scene_recipe
 from warpflat.app.scene.load import Scene
 from warpflat.app.studio.pick import Hit
 from warpflat.app.studio.solve import Solution
-from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, without_side
+from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, find_unused_name, without_side
 from warpflat.flat import Flattening, border_of
-from warpflat.garment import FormDart, dart_along, is_part_of, select_bricks, usual_darts
+from warpflat.garment import is_part_of
 
 __all__ = ["cut_along", "cut_between", "cuttable_lines", "rounded"]
 
@@ -66,14 +65,11 @@ def cut_along(solution: Solution, piece: str, line: str, part: tuple[float, floa
     row = cuttable_lines(solution, piece)[line]
     if part is None:
         # The dart that a pattern book has along the line, unless the piece has it already.
-        plan = solution.plan
-        assert plan is not None
-        recipe = scene_recipe(plan.scene, plan.mannequin)[1]
-        layout, taken = plan.mannequin.layout, {dart.place for dart in recipe.darts}
-        bricks = {name: select_bricks(layout, each.bricks) for name, each in recipe.pieces.items()}
-        darts: Mapping[tuple[str, str], FormDart] = {
+        form = solution.plan.form
+        taken = {dart.place for dart in form.recipe.darts}
+        darts = {
             (dart.piece, dart.line): dart
-            for dart in reversed(usual_darts(layout, plan.form.vertices, bricks))
+            for dart in reversed(form.usual_darts())
             if dart.place not in taken and dart.towards is None
         }
         left = line.removesuffix(" right") + " left"
@@ -130,13 +126,8 @@ def _dart_table(solution: Solution, piece: str, line: str, row: IntArray) -> dic
     if len(row) < 2:
         raise InputError(f"{piece}: the part of {line!r} holds no edge of the mesh; take a longer one")
     ends = row if int(row[0]) in _border(solution.pieces[piece]) else row[::-1]
-    recipe = scene_recipe(plan.scene, plan.mannequin)[1].pieces[piece]
-    layout = plan.mannequin.layout
     base = without_side(line)
-    dart = dart_along(
-        layout, plan.form.vertices, select_bricks(layout, recipe.bricks), plan.form.pieces[piece].grid_vertices[ends],
-        piece=piece, name=base,
-    )  # fmt: skip
+    dart = plan.form.dart_along(piece, plan.form.pieces[piece].grid_vertices[ends], base)
     if dart is None:
         raise InputError(
             f"{piece}: a dart along {line!r} must begin at an edge of the piece, where no other dart lies; "
@@ -162,8 +153,6 @@ def _shares(part: Sequence[float]) -> list[float]:
 
 def _unused(scene: Scene, name: str, piece: str | None = None) -> str:
     """Return a name that no cut of the scene, or of the piece, has yet."""
-    used = {table.name or table.line for table in scene.settings.cuts if table.piece == piece}
-    free, number = name, 2
-    while free in used:
-        free, number = f"{name} {number}", number + 1
-    return free
+    return find_unused_name(
+        name, {table.name or str(table.line) for table in scene.settings.cuts if table.piece == piece}
+    )

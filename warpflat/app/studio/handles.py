@@ -15,7 +15,7 @@ from warpflat.app.studio.cut_tables import rounded
 from warpflat.app.studio.solve import Solution
 from warpflat.core import FloatArray, arc_lengths, unit, unnumbered
 from warpflat.flat import Crack, border_of, seam_kind, triangulate
-from warpflat.garment import FormDart, Mesh, Neckline, PlacedDart, dart_part, select_bricks
+from warpflat.garment import FormDart, Mesh, Neckline, PlacedDart
 
 __all__ = ["Handle", "pattern_handles"]
 
@@ -86,12 +86,11 @@ def _of_darts(plan: GarmentPlan, name: str, flat: FloatArray) -> Iterator[Handle
     """A tip goes along its dart's line; the ends of a mouth make the dart wider or narrower."""
     form = plan.form
     placed = {dart.name: dart for dart in form.darts if dart.piece == name}
-    bricks = select_bricks(plan.mannequin.layout, form.recipe.pieces[name].bricks)
     for dart_name, (left, right) in form.pieces[name].legs().items():
         dart, apart = placed[dart_name], np.linalg.norm(flat[left] - flat[right], axis=1)
         if dart.asked.pleat_mm is not None:
             continue
-        part = dart_part(plan.mannequin.layout, form.vertices, bricks, dart)
+        part = form.dart_part(dart)
         two_tips = dart_name in form.pieces[name].fisheyes
         # A dart with two tips is widest inside.
         mouth = int(apart.argmax()) if two_tips else 0

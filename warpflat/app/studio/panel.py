@@ -7,6 +7,7 @@ from html import escape
 from typing import Any, get_args
 from urllib.parse import quote
 
+from warpflat.app.review.figures import relaxation_words
 from warpflat.app.scene.load import scene_library
 from warpflat.app.scene.schema import SceneTable
 from warpflat.app.studio.maps import MAPS, MapScale
@@ -14,7 +15,7 @@ from warpflat.app.studio.save import Saved
 from warpflat.app.studio.session import Preview, Session
 from warpflat.app.studio.solve import Solution
 from warpflat.core import InputError, energy_words
-from warpflat.flat import load_library, relaxation_words
+from warpflat.flat import load_library
 from warpflat.garment import EASE_PRESETS, form_names, size_names, size_tables
 
 __all__ = ["Panel", "preview_words"]
@@ -205,7 +206,7 @@ def _head(session: Session) -> str:
     solution, scene = session.shown, session.scene
     words = [f"<b>{escape(scene.name)}</b>"]
     if scene.settings.mannequin is not None:
-        words.append(escape(scene.settings.mannequin.size_name or "scan"))
+        words.append(escape(scene.settings.mannequin.size_name))
     rows = ""
     if solution is not None:
         state = "at rest" if solution.at_rest else "<b style='color:#b00020'>not at rest</b>"

@@ -11,7 +11,7 @@ from warpflat.app.review.faults import is_done
 from warpflat.app.scene.as_toml import document_as_toml
 from warpflat.app.scene.load import Scene, load_scene
 from warpflat.app.scene.run import run_scene
-from warpflat.core import InputError, atomic_path, check_file_name, make_file_name, plain_name
+from warpflat.core import InputError, atomic_path, check_file_name, make_file_name, plain_name, with_plain_letters
 from warpflat.flat import Progress
 
 __all__ = ["Saved", "free_name", "run_saved", "scene_file", "write_scene"]
@@ -57,8 +57,8 @@ def scene_file(scene: Scene, name: str) -> Path:
 
 
 def free_name(scene: Scene) -> str:
-    """Return a name under which there is no file yet in the scene's folder."""
-    stem = make_file_name(scene.sources[0].stem if scene.sources else scene.name)
+    """Return a name that a scene can have, and under which there is no file yet in the scene's folder."""
+    stem = make_file_name(with_plain_letters(scene.sources[0].stem if scene.sources else scene.name, " _.-"))
     name, number = stem, 2
     while scene_file(scene, name).exists():
         name, number = f"{stem}_{number}", number + 1

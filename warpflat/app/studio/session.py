@@ -11,16 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.app.scene.cuts import scene_with
+from warpflat.app.scene.drape import drape_scene
 from warpflat.app.scene.ledger import with_cut
 from warpflat.app.scene.load import Scene, scene_fabric
-from warpflat.app.scene.schema import DrapeTable
 from warpflat.app.studio.frame import PieceFrame, Watch
 from warpflat.app.studio.save import Saved, run_saved, scene_file, write_scene
 from warpflat.app.studio.solve import Solution, solve
 from warpflat.app.studio.worker import Superseded, Ticket, Worker
 from warpflat.core import InputError, activity_listener, one_line, system_reason
 from warpflat.flat import relaxation
-from warpflat.garment import Drape, drape
+from warpflat.garment import Drape
 
 __all__ = ["Preview", "Session", "Step"]
 
@@ -300,9 +300,7 @@ class Session:
                 if not ticket.go_on():
                     raise Superseded
 
-            table = step.scene.settings.drape or DrapeTable()
-            garment = solution.garment or next(iter(solution.pieces.values()))
-            step.drape = drape(garment, hold=table.hold, options=table.options(), callback=go_on)
+            step.drape = drape_scene(step.scene, solution.garment, callback=go_on)
             if not step.drape.converged:
                 self.note = (
                     'the drape is not at rest; cloth that slips off is held by the scene, as [drape] hold = ["waist"]'

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
 import numpy as np
 
 from warpflat.app.scene.cuts import CutSequence
 from warpflat.app.scene.form import scene_form, scene_mannequin
-from warpflat.app.scene.form_shaping import settle_shape, without_closed_darts
+from warpflat.app.scene.form_shaping import require_open_darts, settle_shape, with_open_darts
 from warpflat.app.scene.load import Scene, errors_named, scene_relax_options
 from warpflat.app.scene.plan import GarmentPlan, plan_garment, plan_mesh, scene_cuts
 from warpflat.app.scene.surface import scene_surface
-from warpflat.flat import CutPlan, Flattening, Progress, Surface, Verdict, cut, garment_wear, judge, measure_cut
-from warpflat.garment import FormGarment, measure_darts
+from warpflat.flat import CutPlan, Flattening, Progress, Surface, Verdict, cut, judge
+from warpflat.garment import FormGarment, Garment, measure_darts
 
 __all__ = ["Solution", "solve"]
 
@@ -35,18 +35,22 @@ class Solution:
 
     Attributes:
         scene: as it was asked for.
-        pieces: by name.
+        garment: its pieces, and their seams.
         bare: the surface of the scene before its cuts; None of a form.
-        plan, garment: of a form; None of a surface.
+        plan: of a form; None of a surface.
         notes: what was chosen or left out on the way, without what is known of the body.
     """
 
     scene: Scene
-    pieces: Mapping[str, Flattening]
+    garment: Garment
     bare: Surface | None = None
     plan: GarmentPlan | None = None
-    garment: FormGarment | None = None
     notes: tuple[str, ...] = field(default=())
+
+    @property
+    def pieces(self) -> Mapping[str, Flattening]:
+        """The pieces by name."""
+        return self.garment.pieces
 
     @property
     def strain_energy(self) -> float:
@@ -56,10 +60,7 @@ class Solution:
     @cached_property
     def verdict(self) -> Verdict | None:
         """Whether it fits, and why not; None where no cloth is judged."""
-        if self.garment is not None:
-            return judge(self.garment.metrics())
-        measures = {name: piece.measures for name, piece in self.pieces.items()}
-        return judge({"pieces": measures, "wear": garment_wear(measures)})
+        return judge(self.garment.metrics())
 
     @property
     def at_rest(self) -> bool:
@@ -69,19 +70,17 @@ class Solution:
     @property
     def openings(self) -> dict[str, float]:
         """How wide each cut or dart opens, by "piece.name" [m]."""
-        form = None if self.garment is None else self.garment.form
-        if form is not None:
+        if isinstance(self.garment, FormGarment):
             return {
                 f"{name}.{dart['name']}": float(dart["intake_m"])
                 for name, piece in self.pieces.items()
-                for dart in measure_darts(form, name, piece.positions)
+                for dart in measure_darts(self.garment.form, name, piece.positions)
             }
-        found = {}
-        for name, piece in self.pieces.items():
-            for made in piece.cuts:
-                seams = measure_cut(piece.network.surface, piece.positions, made)["seams"]
-                found[f"{name}.{made.name}"] = max((float(seam["opening_m"]) for seam in seams), default=0.0)
-        return found
+        return {
+            f"{name}.{made['name']}": max((float(seam["opening_m"]) for seam in made["seams"]), default=0.0)
+            for name, piece in self.pieces.items()
+            for made in piece.measures["cuts"]
+        }
 
 
 def solve(
@@ -106,35 +105,36 @@ def solve(
             with errors_named(scene.where):
                 step = None if callback is None else partial(callback, scene.name)
                 result = cut(before.pieces[scene.name], slit, relax=scene_relax_options(scene), callback=step)
+            garment = replace(before.garment, pieces={scene.name: result})
         else:
-            result = plan_mesh(scene, cuts=sequence).flatten(callback=callback).pieces[scene.name]
-        return Solution(scene=scene, pieces={scene.name: result}, bare=bare, notes=(*sequence.notes, *result.messages))
+            garment = plan_mesh(scene, cuts=sequence).flatten(callback=callback)
+        told = garment.pieces[scene.name].messages
+        return Solution(scene=scene, garment=garment, bare=bare, notes=(*sequence.notes, *told))
     settled, notes = settle_shape(scene)
-    plan = None if before is None else before.plan
-    mannequin = plan.mannequin if plan is not None and _alike(scene, plan.scene, _OF_BODY) else scene_mannequin(scene)
-    if plan is not None and mannequin is plan.mannequin and _alike(settled, plan.scene, _OF_FORM):
-        form = plan.form
-    else:
-        form = scene_form(settled, mannequin, before=None if plan is None else plan.form)[1]
-    plan = plan_garment(settled, built=(mannequin, form))
-    garment = plan.flatten(callback=callback, known=_known(plan, before))
-    while (opened := without_closed_darts(settled, [garment]))[1]:
-        settled, notes = opened[0], (*notes, *opened[1])
-        plan = plan_garment(settled, built=(mannequin, scene_form(settled, mannequin, before=plan.form)[1]))
+    last = None if before is None else before.plan
+    same_body = last is not None and _alike(scene, last.scene, _OF_BODY)
+    mannequin = last.mannequin if last is not None and same_body else scene_mannequin(scene)
+
+    def made(one: Scene) -> tuple[GarmentPlan, FormGarment]:
+        nonlocal last
+        if last is not None and same_body and _alike(one, last.scene, _OF_FORM):
+            form = last.form
+        else:
+            form = scene_form(one, mannequin, before=None if last is None else last.form)[1]
+        plan = last = plan_garment(one, built=(mannequin, form))
         garment = plan.flatten(callback=callback, known=_known(plan, before))
-    return Solution(
-        scene=scene,
-        pieces=garment.pieces,
-        plan=plan,
-        garment=garment,
-        notes=(*notes, *garment.form.notes, *garment.remarks),
-    )
+        require_open_darts(one, [garment])
+        return plan, garment
+
+    _, (plan, garment), closed = with_open_darts(settled, made)
+    notes = (*notes, *closed, *garment.form.notes, *garment.remarks)
+    return Solution(scene=scene, garment=garment, plan=plan, notes=notes)
 
 
 def _one_more_cut(scene: Scene, before: Solution, sequence: CutSequence) -> CutPlan | None:
     """Return the one cut by which a scene differs from another, if it can be made in the other's piece as that lies there."""
     piece = before.pieces.get(scene.name)
-    if piece is None or piece.unsewn is not None or sequence.auto is not None:
+    if piece is None or before.garment.stitching or piece.unsewn is not None or sequence.auto is not None:
         return None
     others = [key for key in type(scene.settings).model_fields if key not in _CUTS_ONLY]
     made, faces = len(piece.cuts), piece.surface.faces

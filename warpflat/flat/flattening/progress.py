@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.text import energy_words, format_count
 from warpflat.flat.model.network import SpringNetwork
 from warpflat.flat.model.strain import WornStrain, strain_energy, worn_strain
 from warpflat.flat.solver.steps import Relaxation
 from warpflat.flat.solver.stop import Energies, Outcome, Remainder
 from warpflat.flat.surface.mesh import Surface
 
-__all__ = ["CONTACT", "STEPS", "Progress", "Stage", "laid_stage", "make_stage", "make_stages", "relaxation_words"]
+__all__ = ["CONTACT", "STEPS", "Progress", "Stage", "laid_stage", "make_stage", "make_stages"]
 
 #: Name of the stage in which a piece that would lie over itself is kept from it.
 CONTACT = "contact"
@@ -89,34 +86,6 @@ def make_stages(name: str, network: SpringNetwork, layout: FloatArray, outcome: 
     if outcome.first_steps is None or outcome.first_layout is None:
         return (relaxed,)
     return make_stage(STEPS, network, outcome.first_layout, outcome.first_steps), relaxed
-
-
-def relaxation_words(pieces: Iterable[Sequence[Mapping[str, Any]]]) -> str:
-    """Return how many of the paper's steps and how many iterations of L-BFGS relaxed pieces first, and what energy each released.
-
-    Args:
-        pieces: for each the entries of its history, as `Stage.as_dict` has them.
-
-    Returns:
-        Such as "36 steps released 2.3 J, 301 iterations 120 mJ"; empty where nothing was relaxed.
-    """
-    counts: dict[str, int] = {}
-    released: dict[str, float] = {}
-    for stages in pieces:
-        for before, stage in pairwise(stages):
-            if before["name"] not in ("develop", STEPS) or stage["name"] not in (STEPS, "relax"):
-                break
-            # A step is a unit of work, an iteration several.
-            unit = "step" if stage["work_units"] <= stage["steps"] else "iteration"
-            counts[unit] = counts.get(unit, 0) + stage["steps"]
-            # The energy of crushed faces is beyond all numbers.
-            if None not in (before["model_energy_j"], stage["model_energy_j"]):
-                released[unit] = released.get(unit, 0.0) + before["model_energy_j"] - stage["model_energy_j"]
-    return ", ".join(
-        f"{format_count(counts[unit], unit)} released {energy_words(released.get(unit, 0.0))}"
-        for unit in ("step", "iteration")
-        if counts.get(unit)
-    )
 
 
 class Progress:

@@ -145,7 +145,12 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
 
 
 def cap_wishes(form: FormResult, fabric: Fabric, wishes: Sequence[SeamWish] = ()) -> list[SeamWish]:
-    """Return wishes for the sleeves' caps that none of `wishes` is about, as the cloth needs them: none for a knit."""
+    """Return wishes for the sleeves' caps that none of `wishes` is about, as the cloth needs them: none for a knit.
+
+    Raises:
+        InputError: as :func:`seam_ratios`, to which `wishes` must be right.
+    """
+    seam_ratios(form, wishes)
     if fabric.is_knit:
         return []
     plan = plan_form(form)

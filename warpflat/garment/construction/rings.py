@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from warpflat.garment.mannequin.forms import FormResult
     from warpflat.garment.mannequin.mannequin import Level, Mannequin
 
-__all__ = ["GarmentRing", "find_rings", "measure_rings", "ring_line", "rings_line"]
+__all__ = ["GarmentRing", "find_rings", "measure_rings", "ring_line"]
 
 # What is rounded up to this [mm] is easy to measure off, and needs no more precision.
 _ROUNDED_MM = 5.0
@@ -168,19 +168,6 @@ def ring_line(mannequin: Mannequin, ring: IntArray) -> str:
     middle = mannequin.vertices[ring].mean(axis=0)
     middles = {name: mannequin.line(name)[:-1].mean(axis=0) for name in names}
     return min(names, key=lambda name: float(np.linalg.norm(middles[name] - middle)))
-
-
-def rings_line(rings: Sequence[Mapping[str, Any]]) -> str:
-    """Return the console's line about the entry `rings` of `metrics.json`."""
-    shut = [
-        f"{ring['name']} {ring['opening_needed_mm'] / 10:g} cm ({ring['length_mm'] / 10:.1f} < {ring['over']} {ring['girth_mm'] / 10:.1f})"
-        for ring in rings
-        if ring["passes"] is False
-    ]
-    unknown = [ring["name"] for ring in rings if ring["passes"] is None]
-    parts = [f"need an opening: {', '.join(shut)}"] if shut else []
-    parts += [f"not known: {', '.join(unknown)}"] if unknown else []
-    return f"rings: {'; '.join(parts) or f'all {len(rings)} pass'}"
 
 
 def _line_of(name: str) -> str:

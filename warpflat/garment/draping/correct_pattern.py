@@ -24,6 +24,7 @@ from warpflat.core import (
     InputError,
     IntArray,
     factor_symmetric,
+    format_count,
     polyline_length,
     short_repr,
     turned_left,
@@ -38,6 +39,7 @@ from warpflat.garment.draping.moved_pattern import (
     cell_matrix,
     hold_seams,
     largest_share,
+    moved_outlines,
     seam_differences,
     seam_edges,
     with_pattern,
@@ -45,7 +47,7 @@ from warpflat.garment.draping.moved_pattern import (
 from warpflat.garment.draping.relax_drape import relax_drape
 from warpflat.garment.draping.result import Drape
 from warpflat.garment.draping.sewn_cloth import SewnCloth, pieces_of
-from warpflat.pattern import outline_edges
+from warpflat.pattern import Pattern, outline_edges
 
 __all__ = ["Correction", "Round", "correct_pattern", "relieve_pattern"]
 
@@ -127,6 +129,18 @@ class Correction:
         """Return the garment, or the piece, with the corrected pattern."""
         return with_pattern(garment, self.after.cloth)
 
+    def drawn(self, pattern: Pattern, size: str) -> Pattern:
+        """Return a pattern from outside in the size that was draped, corrected; see :func:`moved_outlines`."""
+        return moved_outlines(pattern, size, self.before.cloth, self.after.cloth)
+
+    def describe(self) -> str:
+        """Return in a sentence what letting a pattern out has come to."""
+        first, last = self.rounds[0].strained, self.rounds[-1].strained
+        return (
+            f"corrected in {format_count(len(self.rounds) - 1, 'round')}: {100 * first:.1f} % of the cloth was stretched beyond its "
+            f"limit, now {100 * last:.1f} % ({self.reason})"
+        )
+
     def measures(self, garment: Garment | Flattening | None = None) -> dict[str, object]:
         """Return the entry `correction` of `metrics.json`; with the edges of the garment whose pattern it is, if it is given."""
         rows = [
@@ -160,7 +174,7 @@ def correct_pattern(
 
     Args:
         drape: of the pattern as it is.
-        hold: lines that stay where they are, as in :func:`warpflat.drape`.
+        hold: lines that stay where they are, as in :func:`warpflat.drape`, beside those that an elastic holds.
         fabric: another cloth for the corrected pattern; that of the drape if not given.
         worn_shape: whether the shape as it is worn in `drape` is wanted, rather than the designed one.
         rounds: the most.
@@ -172,7 +186,8 @@ def correct_pattern(
         StepError: another cloth falls off.
     """
     _check_rest(drape)
-    bridging, device, held = not worn_shape, drape.body.device, held_vertices(drape.cloth, hold)
+    bridging, device = not worn_shape, drape.body.device
+    held = held_vertices(drape.cloth, [*hold, *drape.threaded])
     shape = drape.positions if worn_shape else drape.cloth.designed
     cloth = replace(drape.cloth, designed=shape, fabric=fabric or drape.cloth.fabric)
     designed = Body(shape, cloth.faces, device=device) if worn_shape else drape.designed
@@ -252,7 +267,7 @@ def relieve_pattern(drape: Drape, *, hold: Sequence[str] = (), rounds: int = 6) 
         InputError: the drape is not at rest.
     """
     _check_rest(drape)
-    held, limit = held_vertices(drape.cloth, hold), drape.cloth.fabric.strain_limit
+    held, limit = held_vertices(drape.cloth, [*hold, *drape.threaded]), drape.cloth.fabric.strain_limit
     seams = seam_edges(drape.cloth)
     difference = seam_differences(drape.cloth.flat, seams)
 

@@ -12,6 +12,7 @@ import warp as wp
 
 from warpflat.core import AXES, FloatArray, InputError, nearest, polyline_length, reflected, short_repr, start_warp
 from warpflat.flat import Fabric, Surface, triangulate, vertex_normals
+from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.mirror import mirror_plane
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.check_sewn import check_sewn
@@ -180,16 +181,12 @@ def drape_pattern(
     ), notes
 
 
-def place_drafted(
-    pattern: Pattern, lifts: Mapping[str, Lift], body: Mannequin, fabric: Fabric
-) -> dict[str, list[Surface]]:
+def place_drafted(pattern: Pattern, garment: FormGarment) -> dict[str, list[Surface]]:
     """Return what of a pattern has no designed surface, such as collars and flounces, where it is worn: sewn to the rest, not draped.
 
     Args:
-        pattern: its sample size is placed.
-        lifts: by piece the map to its designed surface, of those that have one.
-        body: on which that lies.
-        fabric: of all pieces.
+        pattern: of the garment; its sample size is placed.
+        garment: flattened, on its body.
 
     Returns:
         By piece its copies; none of what lies within the garment, such as a facing.
@@ -197,6 +194,11 @@ def place_drafted(
     Raises:
         InputError: a piece cannot be meshed, or hangs together with none that has a designed surface.
     """
+    lifts = {
+        name: surface_lift(flat.surface.vertices[flat.vertex_origin], flat.positions, triangulate(flat.faces)[0])
+        for name, flat in garment.pieces.items()
+    }
+    body, fabric = garment.mannequin, next(iter(garment.pieces.values())).fabric
     given = pattern.pieces[pattern.sample]
     pieces, seams, _ = whole_pieces(given, pattern.seams)
     pieces, seams, _ = in_one_layer(pieces, seams, lifts)

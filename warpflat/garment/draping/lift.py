@@ -1,4 +1,4 @@
-"""From a pattern in the plane to the surface that it was made of, by a run's `NAME.obj`."""
+"""From a pattern in the plane to the surface that it was made of: of a run's folder, or of a mesh whose texture is its pattern."""
 
 from __future__ import annotations
 
@@ -8,17 +8,53 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from warpflat.core import FARTHEST, FloatArray, InputError, IntArray, reading, reflected, turned_left, unit
-from warpflat.flat import read_mesh_file
-from warpflat.pattern import MIRRORED, Piece
+from warpflat.core import (
+    FARTHEST,
+    FloatArray,
+    InputError,
+    IntArray,
+    make_file_name,
+    reading,
+    reflected,
+    turned_left,
+    unit,
+)
+from warpflat.flat import SUFFIXES, read_mesh_file
+from warpflat.garment.construction.another_body import BESIDE
+from warpflat.garment.construction.as_cut import read_cut_pattern
+from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.pattern import MIRRORED, Pattern, Piece, read_pattern
 
-__all__ = ["Lift", "moved_lift", "read_lift", "surface_lift", "whole_lifts"]
+__all__ = ["Lift", "lifts_on_scan", "moved_lift", "read_lift", "read_lifted", "surface_lift", "whole_lifts"]
 
 #: The places on a surface (#P by 3 [m]) of points of its pattern (#P by 2 [m]); or what else is linear in its triangles.
 Lift = Callable[[FloatArray], FloatArray]
 
 # Triangles around a point that are tried.
 _TRIED = 16
+
+
+def read_lifted(path: Path, *, units: str | None, allowance: float | None) -> tuple[Pattern, dict[str, Lift]]:
+    """Read a pattern, and by piece the way to its designed surface, which a run's folder and a mesh with its sewn pattern have.
+
+    Args:
+        path: a run's folder, a mesh whose texture is its sewn pattern, or a file of a pattern.
+        units: of a mesh that does not say.
+        allowance: from the boundary to the sewing line [m], where a file has none.
+
+    Raises:
+        InputError: a file cannot be read, or units are given of what says its own.
+    """
+    if path.suffix.lower() in SUFFIXES and not path.is_dir():
+        worn = read_cut_pattern(path, units=units, name=make_file_name(path.stem))
+        return worn.pattern, {name: surface_lift(*each) for name, each in worn.surfaces.items()}
+    if units is not None:
+        raise InputError(f"--units: is for a mesh whose texture is its pattern; {path} says its own")
+    if not path.is_dir():
+        return read_pattern(path, allowance=allowance), {}
+    pattern = read_pattern(path / "pattern.json", allowance=allowance)
+    files = {piece.name: path / f"{piece.name}.obj" for piece in pattern.pieces[pattern.sample]}
+    return pattern, {name: read_lift(file) for name, file in files.items() if file.is_file()}
 
 
 def read_lift(path: Path) -> Lift:
@@ -58,6 +94,26 @@ def surface_lift(space: FloatArray, flat: FloatArray, triangles: IntArray) -> Li
 def moved_lift(lift: Lift, turn: FloatArray, shift: FloatArray) -> Lift:
     """Return the map to a surface that was moved: its points @ turn (3 by 3) + shift [m]."""
     return lambda points: lift(points) @ turn + shift
+
+
+def lifts_on_scan(body: Mannequin, lifts: Mapping[str, Lift], pattern: Pattern) -> dict[str, Lift] | None:
+    """Return the lifts to designed surfaces [m] that lie on a scan as their files stand, in the axes of its mannequin; None if they do not.
+
+    Args:
+        body: of a scan, in its pose.
+        lifts: by piece.
+        pattern: of the pieces.
+    """
+    assert body.placed is not None
+    assert body.scan is not None
+    turn, shift = body.placed
+    # The surface is in metres, whatever the scan's unit.
+    turn = turn / np.cbrt(np.linalg.det(turn))
+    moved = {name: moved_lift(lift, turn, shift) for name, lift in lifts.items()}
+    pieces = [piece for piece in pattern.pieces[pattern.sample] if piece.name in moved]
+    borders = [moved[piece.name](edge.points) for piece in pieces for edge in piece.edges]
+    far = cKDTree(body.scan[0]).query(np.concatenate(borders))[0]
+    return moved if np.median(far) <= BESIDE else None
 
 
 def _lift(surface: FloatArray, pattern: FloatArray) -> Lift:

@@ -92,9 +92,10 @@ def needed_measurements(bands: Collection[tuple[str, str]], *, hood: bool = Fals
 def write_measurement_card(
     path: str | os.PathLike[str],
     mannequin: Mannequin,
-    needed: Collection[str],
+    bands: Collection[tuple[str, str]],
     *,
     title: str,
+    hood: bool = False,
     values: Mapping[str, float] | None = None,
     guessed: Collection[str] = (),
 ) -> None:
@@ -103,7 +104,7 @@ def write_measurement_card(
     Args:
         path: the file, ``*.png``.
         mannequin: whose picture it is.
-        needed: measurements.
+        bands, hood: of the garment, as :func:`needed_measurements` takes them.
         title: of the page.
         values: what is known [m]; a row without one has a line to write on.
         guessed: of the values those that nobody gave.
@@ -111,6 +112,7 @@ def write_measurement_card(
     Raises:
         InputError: the file cannot be written.
     """
+    needed = needed_measurements(bands, hood=hood)
     with drawn_page(path, *_PAGE) as pen:
         pen.write(0.5, 11.3, title, 15, fontweight="bold")
         pen.write(0.5, 11.03, "Measure over underwear, the tape snug and level, standing upright.", 9.5, color=GREY)

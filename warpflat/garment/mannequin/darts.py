@@ -16,12 +16,12 @@ from warpflat.garment.mannequin.layout import Layout, joined_runs
 __all__ = [
     "FormDart",
     "PlacedDart",
-    "dart_along",
-    "dart_part",
-    "dart_rows",
+    "cloth_of",
+    "grid_line",
+    "lies_left",
+    "longest_run",
     "place_darts",
     "standard_darts",
-    "usual_darts",
 ]
 
 #: Where darts end unless they say otherwise [mm]: before the bust point along the bust line; below the bust's level in the
@@ -125,14 +125,14 @@ def place_darts(
     """
     if not darts:
         return ()
-    cloths = {name: _cloth(layout, chosen, (opened or {}).get(name, ())) for name, chosen in bricks.items()}
+    cloths = {name: cloth_of(layout, chosen, (opened or {}).get(name, ())) for name, chosen in bricks.items()}
     found: list[PlacedDart] = []
     for dart in darts:
         where = f"dart {dart.name!r}"
         if dart.piece not in cloths:
             raise InputError(f"{where}: no piece {dart.piece!r}; {nearest(dart.piece, cloths)}")
         cloth = cloths[dart.piece]
-        run = _longest_run(_grid_line(layout, dart), cloth)
+        run = longest_run(grid_line(layout, dart), cloth)
         if not run or not {run[0], run[-1]} & cloth.border:
             raise InputError(f"{where}: line {dart.line!r} does not run from the border into piece {dart.piece!r}")
         point: int | None = None
@@ -159,7 +159,7 @@ def place_darts(
         image = layout.mirror[placed.row]
         partner = next((name for name, cloth in cloths.items() if _holds(cloth, image)), None)
         if dart.mirrored and partner is not None and not np.array_equal(image, placed.row):
-            side, other = ("left", "right") if _lies_left(layout, placed.row) else ("right", "left")
+            side, other = ("left", "right") if lies_left(layout, placed.row) else ("right", "left")
             found.append(replace(placed, name=f"{dart.name} {side}"))
             found.append(replace(placed, name=f"{dart.name} {other}", piece=partner, row=image))
         else:
@@ -183,12 +183,12 @@ def standard_darts(layout: Layout, bricks: Mapping[str, Sequence[str]]) -> tuple
     """
     found: list[FormDart] = []
     for piece, chosen in bricks.items():
-        cloth = _cloth(layout, chosen)
+        cloth = cloth_of(layout, chosen)
         if _bust_mouth(layout, cloth) is not None:
             found.append(FormDart(name="bust dart", piece=piece, line="bust"))
         for face in ("front", "back"):
             dart = FormDart(name="waist dart", piece=piece, line=f"princess {face} left")
-            run = _longest_run(_grid_line(layout, dart), cloth)
+            run = longest_run(grid_line(layout, dart), cloth)
             at_waist = {int(run[at]) for at in (0, -1)} & set(layout.lines["waist"].tolist()) if len(run) else set()
             if at_waist or _waist_of_fisheye(layout, run) is not None:
                 found.append(dart)
@@ -197,7 +197,8 @@ def standard_darts(layout: Layout, bricks: Mapping[str, Sequence[str]]) -> tuple
     return tuple(found)
 
 
-def _cloth(layout: Layout, bricks: Sequence[str], opened: Sequence[str] = ()) -> _Cloth:
+def cloth_of(layout: Layout, bricks: Sequence[str], opened: Sequence[str] = ()) -> _Cloth:
+    """Return a piece of bricks on the grid, cut along the lines along which it is opened."""
     return _cloth_of(layout, tuple(bricks), tuple(opened))
 
 
@@ -218,13 +219,13 @@ def _holds(cloth: _Cloth, row: IntArray) -> bool:
     return begins and cloth.border.isdisjoint(ids[1:]) and cloth.inner.issuperset(itertools.pairwise(ids))
 
 
-def _lies_left(layout: Layout, row: IntArray) -> bool:
+def lies_left(layout: Layout, row: IntArray) -> bool:
     """Return whether a row lies on the left of the body."""
     left = np.concatenate([grid.ravel() for name, grid in layout.bricks.items() if is_side(name, "left")])
     return bool(np.isin(row, left).all())
 
 
-def _grid_line(layout: Layout, dart: FormDart) -> list[int]:
+def grid_line(layout: Layout, dart: FormDart) -> list[int]:
     """Return the vertices of the line along which a dart lies, a closed one without its repeated first vertex."""
     for name in (dart.line, *([] if dart.towards is None else [dart.towards])):
         if name not in layout.lines:
@@ -242,7 +243,7 @@ def _grid_line(layout: Layout, dart: FormDart) -> list[int]:
     return layout.rings[:, round((1.0 - dart.between) * ends[0] + dart.between * ends[1])].tolist()
 
 
-def _longest_run(line: Sequence[int], cloth: _Cloth) -> list[int]:
+def longest_run(line: Sequence[int], cloth: _Cloth) -> list[int]:
     """Return the longest stretch of a line inside a piece."""
     return max(joined_runs(edge for edge in itertools.pairwise(line) if edge in cloth.inner), key=len, default=[])
 
@@ -292,91 +293,9 @@ def _default_fisheye(layout: Layout, vertices: FloatArray, run: list[int], waist
     return run[max(upper, bust + 1) : min(lower, len(run) - 2) + 1]
 
 
-def dart_along(
-    layout: Layout, vertices: FloatArray, bricks: Sequence[str], row: IntArray, *, piece: str, name: str
-) -> FormDart | None:
-    """Return the dart, or the cut along a whole line, that slits a row of vertices of a piece; None if no line runs there.
-
-    Args:
-        layout, vertices: of the form, #V by 3 [m].
-        bricks: of the piece, both sides of the body.
-        row: the mannequin's vertices, from the border.
-        piece, name: for the dart.
-    """
-    cloth, ids = _cloth(layout, bricks), row.tolist()
-    for wanted in (layout.mirror[row].tolist(), ids) if not _lies_left(layout, row) else (ids,):
-        for line in layout.lines:
-            run = _longest_run(layout.lines[line].tolist(), cloth)
-            for end, directed in ((0.0, run), (1.0, run[::-1])):
-                if directed[: len(wanted)] != wanted:
-                    continue
-                if len(wanted) == len(directed):
-                    return FormDart(name=name, piece=piece, line=line, part=(0.0, 1.0))
-                arc = arc_lengths(vertices[directed])
-                share = round(float(arc[len(wanted) - 1] / arc[-1]), 3)
-                return FormDart(name=name, piece=piece, line=line, part=(end, abs(end - share)))
-    return None
-
-
-def dart_rows(
-    layout: Layout, vertices: FloatArray, bricks: Mapping[str, Sequence[str]], dart: FormDart
-) -> list[tuple[str, IntArray]]:
-    """Return the mannequin's vertices that a dart, or a cut along a whole line, slits on both sides of the body, and in which piece.
-
-    Args:
-        layout, vertices: of the form, #V by 3 [m].
-        bricks: by piece, both sides of the body.
-        dart: that is asked for.
-
-    Raises:
-        InputError: it does not fit the piece.
-    """
-    if not dart.parts_piece:
-        return [(each.piece, each.row) for each in place_darts(layout, vertices, bricks, [dart])]
-    row = np.array(_longest_run(_grid_line(layout, dart), _cloth(layout, bricks[dart.piece])), dtype=np.int32)
-    image = layout.mirror[row]
-    return [(dart.piece, row), *([] if np.array_equal(np.sort(image), np.sort(row)) else [(dart.piece, image)])]
-
-
-def dart_part(layout: Layout, vertices: FloatArray, bricks: Sequence[str], dart: PlacedDart) -> tuple[float, float]:
-    """Return the shares of its line's length within the piece between which a dart lies; see `FormDart.part`.
-
-    Args:
-        layout, vertices: of the form, #V by 3 [m].
-        bricks: of the piece, both sides of the body.
-        dart: of that piece.
-    """
-    line, row = _grid_line(layout, dart.asked), dart.row.tolist()
-    if row[0] not in line:  # the mirror image of what was asked for
-        line = layout.mirror[line].tolist()
-    run = _longest_run(line, _cloth(layout, bricks))
-    arc = arc_lengths(vertices[run])
-    first, last = (float(arc[run.index(vertex)] / arc[-1]) for vertex in (row[0], row[-1]))
-    return first, last
-
-
-def usual_darts(layout: Layout, vertices: FloatArray, bricks: Mapping[str, Sequence[str]]) -> tuple[FormDart, ...]:
-    """Return every dart that a book knows in the pieces, once a side: those of the block, and from the shoulders.
-
-    Args:
-        layout, vertices: of the form, #V by 3 [m].
-        bricks: by piece, both sides of the body.
-    """
-    found = list(standard_darts(layout, bricks))
-    for piece in bricks:
-        for face in ("front", "back"):
-            dart = FormDart(name="shoulder dart", piece=piece, line=f"princess {face} left", at="shoulder left")
-            try:
-                place_darts(layout, vertices, bricks, [dart])
-            except InputError:
-                continue
-            found.append(dart)
-    return tuple(found)
-
-
 def _bust_mouth(layout: Layout, cloth: _Cloth) -> list[int] | None:
     """Return the run of the bust line from the left side of a front piece; None if it does not run from there to a bust point."""
-    run = _longest_run(layout.lines["bust"].tolist(), cloth)
+    run = longest_run(layout.lines["bust"].tolist(), cloth)
     side = int(layout.rings[layout.level_row["bust"], layout.quarter])
     if side not in (run[0], run[-1]) if run else True:
         return None

@@ -14,6 +14,7 @@ from warpflat.core import (
     FloatArray,
     InputError,
     IntArray,
+    arc_lengths,
     check_file_name,
     nearest,
     quote_value,
@@ -23,7 +24,16 @@ from warpflat.core import (
 )
 from warpflat.garment.mannequin.blend import Adjustment, adjusted_vertices, is_tight
 from warpflat.garment.mannequin.bricks import select_bricks
-from warpflat.garment.mannequin.darts import FormDart, PlacedDart, place_darts
+from warpflat.garment.mannequin.darts import (
+    FormDart,
+    PlacedDart,
+    cloth_of,
+    grid_line,
+    lies_left,
+    longest_run,
+    place_darts,
+    standard_darts,
+)
 from warpflat.garment.mannequin.ease import ease_from
 from warpflat.garment.mannequin.form_seams import FormSeam, find_seams
 from warpflat.garment.mannequin.layout import RING_LEVELS
@@ -124,6 +134,8 @@ class FormResult:
         ease: by level, what it asks for [cm]; without levels that have another one's outline or lie between ruled or bridged ones.
         recipe, body, half: what it was built from.
         notes: what was changed for this body, one sentence each.
+        layout: the mannequin's.
+        bricks: of the recipe's pieces by name, on both sides of the body.
     """
 
     __repr__ = short_repr
@@ -138,10 +150,71 @@ class FormResult:
     darts: tuple[PlacedDart, ...] = ()
     ease: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    layout: Layout = field(repr=False)
+    bricks: Mapping[str, Sequence[str]] = field(repr=False)
 
     def legs(self) -> dict[tuple[str, str], tuple[IntArray, IntArray]]:
         """Return the legs of every dart that the pieces have, by piece and dart; half pieces have those on the left."""
         return {(name, dart): legs for name, piece in self.pieces.items() for dart, legs in piece.legs().items()}
+
+    def usual_darts(self) -> tuple[FormDart, ...]:
+        """Return every dart that a book knows in the pieces, once a side: those of the block, and from the shoulders."""
+        found = list(standard_darts(self.layout, self.bricks))
+        for piece in self.bricks:
+            for face in ("front", "back"):
+                dart = FormDart(name="shoulder dart", piece=piece, line=f"princess {face} left", at="shoulder left")
+                try:
+                    self.dart_rows(dart)
+                except InputError:
+                    continue
+                found.append(dart)
+        return tuple(found)
+
+    def dart_rows(self, dart: FormDart) -> list[tuple[str, IntArray]]:
+        """Return the mannequin's vertices that a dart, or a cut along a whole line, slits on both sides of the body, and in which piece.
+
+        Raises:
+            InputError: it does not fit the piece.
+        """
+        if not dart.parts_piece:
+            placed = place_darts(self.layout, self.vertices, self.bricks, [dart])
+            return [(each.piece, each.row) for each in placed]
+        run = longest_run(grid_line(self.layout, dart), cloth_of(self.layout, self.bricks[dart.piece]))
+        row = np.array(run, dtype=np.int32)
+        image = self.layout.mirror[row]
+        return [(dart.piece, row), *([] if np.array_equal(np.sort(image), np.sort(row)) else [(dart.piece, image)])]
+
+    def dart_along(self, piece: str, row: IntArray, name: str) -> FormDart | None:
+        """Return the dart, or the cut along a whole line, of a name that slits a row of vertices of a piece; None if no line runs there.
+
+        Args:
+            piece: its name.
+            row: the mannequin's vertices, from the border.
+            name: for the dart.
+        """
+        cloth, ids, mirror = cloth_of(self.layout, self.bricks[piece]), row.tolist(), self.layout.mirror
+        for wanted in (mirror[row].tolist(), ids) if not lies_left(self.layout, row) else (ids,):
+            for line, vertices in self.layout.lines.items():
+                run = longest_run(vertices.tolist(), cloth)
+                for end, directed in ((0.0, run), (1.0, run[::-1])):
+                    if directed[: len(wanted)] != wanted:
+                        continue
+                    if len(wanted) == len(directed):
+                        return FormDart(name=name, piece=piece, line=line, part=(0.0, 1.0))
+                    arc = arc_lengths(self.vertices[directed])
+                    share = round(float(arc[len(wanted) - 1] / arc[-1]), 3)
+                    return FormDart(name=name, piece=piece, line=line, part=(end, abs(end - share)))
+        return None
+
+    def dart_part(self, dart: PlacedDart) -> tuple[float, float]:
+        """Return the shares of its line's length within the piece between which a dart lies; see `FormDart.part`."""
+        line, row = grid_line(self.layout, dart.asked), dart.row.tolist()
+        if row[0] not in line:  # the mirror image of what was asked for
+            line = self.layout.mirror[line].tolist()
+        run = longest_run(line, cloth_of(self.layout, self.bricks[dart.piece]))
+        arc = arc_lengths(self.vertices[run])
+        first, last = (float(arc[run.index(vertex)] / arc[-1]) for vertex in (row[0], row[-1]))
+        return first, last
 
     def differs_by_darts(self, body: FloatArray, form: Form, half: bool) -> bool:
         """Return whether another form on a body is this one with other darts, if any."""
@@ -326,7 +399,7 @@ def realise(
     }
     return FormResult(
         name=form.name, recipe=form, body=body, half=half,
-        vertices=vertices, pieces=pieces, seams=find_seams(pieces), darts=placed, ease=ease,
+        vertices=vertices, pieces=pieces, seams=find_seams(pieces), darts=placed, ease=ease, layout=layout, bricks=bricks,
     )  # fmt: skip
 
 

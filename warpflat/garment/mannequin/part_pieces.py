@@ -79,13 +79,7 @@ def taken_over(layout: Layout, vertices: FloatArray, form: Form, seams: Sequence
 
 
 def princess_seams(layout: Layout, bricks: Sequence[str], piece: str) -> list[FormDart]:
-    """Return the cuts along whole princess lines that part a piece on both sides of the body.
-
-    Args:
-        layout: the grid.
-        bricks: of the piece, both sides of the body.
-        piece: its name.
-    """
+    """Return the cuts along whole princess lines that part a piece of these bricks, both sides of the body."""
     lines = [f"princess {face} left" for face in ("front", "back")]
     return [
         FormDart(name="princess seam", piece=piece, line=line, part=(0.0, 1.0))

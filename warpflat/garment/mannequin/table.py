@@ -61,6 +61,11 @@ class MannequinTable(Table):
             return self.size
         return f"{self.size or ''} {MADE_TO_MEASURE}".strip()
 
+    @property
+    def label(self) -> str:
+        """What lists call the body: its size, or its scan."""
+        return self.size_name if self.scan is None else Path(self.scan).stem
+
 
 def mannequin_from_table(table: MannequinTable, *, path_of: Callable[[str], Path]) -> Mannequin:
     """Return the mannequin of a scene's table.

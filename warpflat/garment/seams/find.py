@@ -56,7 +56,7 @@ from warpflat.garment.seams.tailor import FACING, cut_as_a_tailor, draw_fields, 
 from warpflat.garment.seams.thickness import without_thickness
 from warpflat.pattern import FoundSeam
 
-__all__ = ["GRAIN", "FoundSeams", "find_seams", "seam_words"]
+__all__ = ["GRAIN", "FoundSeams", "find_seams"]
 
 Ids = NDArray[np.int64]
 
@@ -117,6 +117,12 @@ class FoundSeams:
             if self.beyond_limit(knit) <= NO_PATTERN:
                 return knit.name
         return ""
+
+    def describe(self) -> str:
+        """Return what was found in one line."""
+        total = 100 * sum(seam.length for seam in self.seams)
+        along = f", along {self.along}" if self.along else ""
+        return f"{self.what}: {format_count(len(self.pieces), 'piece')}, {format_count(len(self.seams), 'seam')} of {total:.0f} cm{along}"
 
     def entry(self, pieces: Sequence[Flattening], allowance: float) -> dict[str, Any]:
         """Return the entry `garment` of `metrics.json`: what it is, its seams, and whether this is a pattern yet.
@@ -585,10 +591,3 @@ def _grain(piece: Surface, cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy) -> N
     if len(np.unique(line)) < len(line) or reach < 0.3 * float(np.ptp(piece.vertices @ along)):
         return None
     return np.asarray(line, dtype=np.int32)
-
-
-def seam_words(found: FoundSeams) -> str:
-    """Return what was found in one line."""
-    total = 100 * sum(seam.length for seam in found.seams)
-    along = f", along {found.along}" if found.along else ""
-    return f"{found.what}: {format_count(len(found.pieces), 'piece')}, {format_count(len(found.seams), 'seam')} of {total:.0f} cm{along}"

@@ -7,17 +7,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from warpflat.core import InputError, without_side
-from warpflat.garment import (
-    FinishingTable,
-    FormResult,
-    Mannequin,
-    Neckline,
-    OpeningTable,
-    measure_rings,
-    opened_rings,
-    sized_opening,
-    with_plackets,
-)
+from warpflat.garment.construction.details import FinishingTable, OpeningTable
+from warpflat.garment.construction.finishing import with_plackets
+from warpflat.garment.construction.openings import opened_rings, sized_opening
+from warpflat.garment.construction.rings import measure_rings
+from warpflat.garment.mannequin.forms import FormResult
+from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.garment.mannequin.neckline import Neckline
 
 __all__ = ["wide_enough"]
 
@@ -45,7 +41,7 @@ def wide_enough(
         strain_limit: of the cloth.
         openings, finishing: of the garment; openings and plackets count.
     """
-    from warpflat.garment import pattern_girths
+    from warpflat.garment.construction.girths import pattern_girths  # with it the springs are loaded
 
     passed: dict[str, tuple[str, float]] = {}
     asked = form.recipe
