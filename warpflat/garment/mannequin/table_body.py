@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -167,7 +168,9 @@ def _quarters(m: Measurements, profile: Callable[[float], Profile]) -> dict[str,
             chest=chest[face], centre=spline(np.linspace(0.0, polyline_length(centre), 100)),
         )  # fmt: skip
         curves[f"{face}-left"] = left
-        flipped = {name: reflected(line, AXES["+x"]) for name, line in vars(left).items() if name != "notch"}
+        flipped: dict[str, Any] = {
+            name: reflected(line, AXES["+x"]) for name, line in vars(left).items() if name != "notch"
+        }
         curves[f"{face}-right"] = replace(left, **flipped)
     return {name: curves[name] for name in QUARTERS}
 
