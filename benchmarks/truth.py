@@ -30,10 +30,11 @@ from warpflat.flat.flattening.result import Flattening
 from warpflat.flat.surface.connectivity import border_loops
 from warpflat.flat.surface.io.read import read_mesh_file
 from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.normals import flat_areas
 from warpflat.flat.surface.triangles import triangulate
 from warpflat.garment.construction.laid_as_cut import distances_laid
 from warpflat.garment.construction.sew_pieces import Bands, sew_pieces
-from warpflat.garment.construction.sewn_panels import SewnPanel, mesh_area, sewn_panels
+from warpflat.garment.construction.sewn_panels import SewnPanel, sewn_panels
 
 FloatArray = NDArray[np.float64]
 
@@ -75,7 +76,7 @@ def peers(panel: SewnPanel) -> dict[str, FloatArray]:
     pins = np.array([first, border[np.argmax(np.linalg.norm(v[border] - v[first], axis=1))]])
     reach = float(np.linalg.norm(v[pins[1]] - v[pins[0]]))
     lscm = np.ascontiguousarray(igl.lscm(v, t, pins, np.array([[0.0, 0.0], [reach, 0.0]]))[0])
-    lscm *= np.sqrt(panel.worn_area / max(mesh_area(lscm, panel.surface), 1e-12))
+    lscm *= np.sqrt(panel.worn_area / max(float(flat_areas(lscm, triangulate(panel.surface.faces)[0]).sum()), 1e-12))
     data = igl.ARAPData()
     data.max_iter = 100
     pin = border[:1].astype(np.int32)

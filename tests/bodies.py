@@ -1,10 +1,16 @@
-"""Bodies of a size and bodies fitted to scans, each made once in a process, whoever asks; nobody changes one."""
+"""Bodies of a size and bodies fitted to scans, each made once in a run of the tests, whoever asks; nobody changes one."""
 
 from __future__ import annotations
 
 import functools
+import hashlib
+import os
+import pickle
+import tempfile
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -13,9 +19,25 @@ from warpflat.garment.mannequin.common_body import CommonBody
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.stand_body import StandingBody, stand_body
 
-__all__ = ["body_of_size", "built_once", "laid_once", "mean_person", "stood", "with_bent_elbows"]
+__all__ = ["body_of_size", "built_once", "had_by_all", "laid_once", "mean_person", "stood", "with_bent_elbows"]
 
+_Made = TypeVar("_Made")
 _from_size, _of_mannequin = Mannequin.from_size, CommonBody.of_mannequin
+
+
+def had_by_all(key: bytes, make: Callable[[], _Made]) -> _Made:
+    """Return what `make` gives; of processes that run the tests beside each other one makes it, and the others read its file."""
+    run = os.environ.get("PYTEST_XDIST_TESTRUNUID")
+    if run is None:
+        return make()
+    file = Path(tempfile.gettempdir()) / f"warpflat-tests-{run}" / hashlib.sha256(key).hexdigest()
+    if not file.exists():
+        file.parent.mkdir(exist_ok=True)
+        part = file.with_suffix(f".{os.getpid()}")
+        part.write_bytes(pickle.dumps(make()))
+        part.replace(file)
+    # Whoever made it reads it, too: all have the same.
+    return pickle.loads(file.read_bytes())  # type: ignore[no-any-return]
 
 
 @functools.cache
@@ -34,19 +56,25 @@ def body_of_size(resolution_mm: float, size: str = "EU 38") -> Mannequin:
 
 
 @functools.cache
+def _laid(mannequin: Mannequin) -> CommonBody:
+    key = b"laid" + mannequin.vertices.tobytes() + mannequin.layout.faces.tobytes()
+    return had_by_all(key, lambda: _of_mannequin(mannequin, name=""))
+
+
+@functools.cache
 def laid_once(mannequin: Mannequin, *, name: str) -> CommonBody:
     """In place of `CommonBody.of_mannequin`."""
-    return _of_mannequin(mannequin, name=name)
+    return replace(_laid(mannequin), name=name)
 
 
-_stood: dict[object, StandingBody] = {}
+_stood: dict[bytes, StandingBody] = {}
 
 
 def stood(vertices: np.ndarray, triangles: np.ndarray, **asked: Any) -> StandingBody:
     """The body that is fitted to a scan: one fit for all that asks other things of the same scan; in place of `stand_body`."""
-    key = (vertices.tobytes(), triangles.tobytes(), repr(sorted(asked.items())))
+    key = vertices.tobytes() + triangles.tobytes() + repr(sorted(asked.items())).encode()
     if key not in _stood:
-        _stood[key] = stand_body(vertices, triangles, **asked)
+        _stood[key] = had_by_all(key, lambda: stand_body(vertices, triangles, **asked))
     return _stood[key]
 
 

@@ -2,8 +2,10 @@
 
 import gc
 import os
+import shutil
 import signal
 import sys
+import tempfile
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
@@ -44,13 +46,19 @@ def pytest_configure(config: pytest.Config) -> None:
         disturb(seed)
 
 
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Remove the bodies that the processes of a run have shared."""
+    if (run := getattr(config.pluginmanager.get_plugin("dsession"), "nodemanager", None)) is not None:
+        shutil.rmtree(Path(tempfile.gettempdir()) / f"warpflat-tests-{run.testrunuid}", ignore_errors=True)
+
+
 @pytest.fixture(autouse=True, scope="module")
 def _others_work_once(request: pytest.FixtureRequest) -> Iterator[None]:
     """What is no claim of a test is had sooner.
 
-    A body of a size is built, and a scan fitted, once in a process, sheets and cloth are laid in one order of the pieces instead of
-    eight, and the rooms that read and write most USD read it in this process; all others, and the command's own processes, in one of
-    its own.
+    A body of a size is built once in a process, and a scan fitted once in a run; sheets and cloth are laid in one order of the pieces
+    instead of eight; and the rooms that read and write most USD read it in this process, all others, and the command's own processes,
+    in one of its own.
     """
     from bodies import built_once, laid_once, stood
 

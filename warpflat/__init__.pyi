@@ -58,7 +58,7 @@ from .garment import Recovery as Recovery
 from .garment import ScanOptions as ScanOptions
 from .garment import SeamCut as SeamCut
 from .garment import SeamOptions as SeamOptions
-from .garment import SeamWish as SeamWish
+from .garment import SeamTable as SeamTable
 from .garment import Straight as Straight
 from .garment import correct_pattern as correct_pattern
 from .garment import drape as drape

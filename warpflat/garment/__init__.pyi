@@ -17,7 +17,6 @@ from .construction.details import FinishingTable as FinishingTable
 from .construction.details import OpeningTable as OpeningTable
 from .construction.details import PocketTable as PocketTable
 from .construction.details import SeamTable as SeamTable
-from .construction.ease import SeamWish as SeamWish
 from .construction.ease import cap_wishes as cap_wishes
 from .construction.file_seams import asked_seams as asked_seams
 from .construction.file_seams import file_seams as file_seams

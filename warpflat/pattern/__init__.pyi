@@ -70,7 +70,6 @@ from .export.figure import write_moving_picture as write_moving_picture
 from .export.fit_picture import write_wear_sheet as write_wear_sheet
 from .export.geometry import Polylines as Polylines
 from .export.geometry import face_areas as face_areas
-from .export.geometry import outline_edges as outline_edges
 from .export.ledger_picture import candidate_words as candidate_words
 from .export.ledger_picture import write_ledger_picture as write_ledger_picture
 from .export.letters import all_letters as all_letters

@@ -68,7 +68,8 @@ def _skirt(path: Path, *, texture: bool = True, shift: float = 0.0, unit: float 
 
 def test_a_skirt_is_fitted_to_another_size(command: Command):
     _skirt(Path("skirt.obj"))
-    ended = command("fit", "skirt.obj", "--units", "m", "--from", "EU 36", "--to", "EU 42", "--out", "fitted", *BARE)
+    shown = ("--frames", "0", "--quiet")
+    ended = command("fit", "skirt.obj", "--units", "m", *ON, "--to", "EU 42", "--out", "fitted", *shown)
     assert (ended.code, ended.err) == (0, "")
     report = json.loads(Path("fitted/fit.json").read_text(encoding="utf-8"))
     (entry,) = report["bodies"]
@@ -93,13 +94,11 @@ def test_a_skirt_is_fitted_to_another_size(command: Command):
     assert np.array_equal(before.raw.polygons, after.raw.polygons)
     files = metrics["files"]["skirt"]
     assert {"skirt.fitted.obj", "skirt.body.obj", "pattern.json"} <= set(files)
-    # A second time it replaces what it has written; its page lists all files.
-    shown = ("--frames", "0", "--quiet")
-    again = command("fit", "skirt.obj", "--units", "m", "--from", "EU 36", "--to", "EU 42", "--out", "fitted", *shown)
-    assert (again.code, again.err) == (0, "")
+    # Its page lists all files, and a second time it would replace what it has written.
     page = Path("fitted/review.html").read_text(encoding="utf-8")
-    for file in json.loads(Path("fitted/metrics.json").read_text(encoding="utf-8"))["files"]["skirt"]:
-        assert file == "review.html" or f'href="{file}"' in page
+    assert [file for file in files if file != "review.html" and f'href="{file}"' not in page] == []
+    assert {"metrics.json", *STUDY_FILES[:1], *files} == {path.name for path in Path("fitted").iterdir()}
+    refuse_to_replace_others(Path("fitted"), ["metrics.json", *STUDY_FILES, *files])
 
 
 def test_a_known_pattern_is_graded_and_keeps_its_grain(tmp_path: Path):

@@ -63,6 +63,6 @@ def test_levels_do_not_wave_to_be_as_long_as_asked(dress: Garment):
 
 def test_an_edge_is_drawn_in_parts_that_meet_at_its_corners():
     bent = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [3.0, 1.0], [3.0, 2.0]])
-    piece = SimpleNamespace(darts={}, fold=None, edges={"side": np.arange(6)})
+    piece = SimpleNamespace(fold=None, leg_edges=frozenset(), edges={"side": np.arange(6)})
     parts = list(_open_edges(SimpleNamespace(pieces={"front": piece}), "front", bent))  # type: ignore[arg-type]
     assert [(edge, vertices.tolist()) for edge, vertices in parts] == [("side", [0, 1, 2, 3]), ("side", [3, 4, 5])]

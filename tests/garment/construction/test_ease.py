@@ -16,7 +16,8 @@ from warpflat.flat.model.membrane import Model
 from warpflat.flat.solver.options import RelaxOptions
 from warpflat.flat.solver.steps import Relaxation
 from warpflat.flat.surface.shapes import make_shape
-from warpflat.garment.construction.ease import SeamWish, cap_wishes, seam_ratios
+from warpflat.garment.construction.details import SeamTable
+from warpflat.garment.construction.ease import cap_wishes, seam_ratios
 from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.fullness import FullEdge, give_fullness, measure_fullness
 from warpflat.garment.construction.garment import Garment
@@ -38,9 +39,9 @@ def shirt(mannequin: Mannequin) -> FormResult:
 
 
 WISHES = (
-    SeamWish(name="armhole left", factor=1.04),
-    SeamWish(name="shoulder right", factor=1.03, longer="front"),
-    SeamWish(name="side left", factor=1.02, longer="back.side left"),
+    SeamTable(name="armhole left", gather=1.04),
+    SeamTable(name="shoulder right", fullness=0.03, longer="front"),
+    SeamTable(name="side left", fullness=0.02, longer="back.side left"),
 )
 
 
@@ -63,7 +64,7 @@ def test_a_wish_finds_all_stretches_of_its_seam_and_the_longer_side(shirt: FormR
     # As the pattern says it: how much longer the second side is.
     assert wished.ease == pytest.approx({"armhole left": 0.04, "shoulder right": 1 / 1.03 - 1, "side left": 0.02})
     assert {piece: len(edges) for piece, edges in wished.full.items()} == {"sleeve_left": 2, "front": 1, "back": 1}
-    assert seam_ratios(shirt, [SeamWish(name="back armhole left", factor=1.04)]).ease == {
+    assert seam_ratios(shirt, [SeamTable(name="back armhole left", gather=1.04)]).ease == {
         "armhole left": pytest.approx(0.04)
     }
 
@@ -105,24 +106,23 @@ def test_cap_in_two_parts_is_eased_beside_the_seam_over_the_arm(mannequin: Manne
 @pytest.mark.parametrize(
     ("wish", "message"),
     [
-        (SeamWish(name="armhol left", factor=1.04), r"there is no seam 'armhol left'; did you mean 'armhole left'"),
+        (SeamTable(name="armhol left", fullness=0.04), r"there is no seam 'armhol left'; did you mean 'armhole left'"),
         (
-            SeamWish(name="side left", factor=1.04, longer="sleeve_left"),
+            SeamTable(name="side left", fullness=0.04, longer="sleeve_left"),
             r"seam 'side left': 'sleeve_left' is not one of",
         ),
-        (SeamWish(name="side left", factor=0.9), r"seam 'side left': one side is 0.9 times as long"),
         (
-            SeamWish(name="underarm left", factor=1.02, longer="sleeve_left"),
+            SeamTable(name="underarm left", fullness=0.02, longer="sleeve_left"),
             r"both sides are of 'sleeve_left'; name the edge",
         ),
     ],
 )
-def test_a_wrong_wish_is_told_in_one_line(shirt: FormResult, wish: SeamWish, message: str):
+def test_a_wrong_wish_is_told_in_one_line(shirt: FormResult, wish: SeamTable, message: str):
     with pytest.raises(InputError, match=message) as caught:
         seam_ratios(shirt, [wish])
     assert "\n" not in str(caught.value)
     with pytest.raises(InputError, match="is named twice"):
-        seam_ratios(shirt, [WISHES[0], SeamWish(name="back armhole left", factor=1.1)])
+        seam_ratios(shirt, [WISHES[0], SeamTable(name="back armhole left", fullness=0.1)])
 
 
 # --- what comes out
@@ -210,14 +210,16 @@ def test_a_woven_cap_is_eased_in_above_its_notches_and_a_knit_one_is_not(mannequ
 
 
 def test_no_ease_is_no_fullness(shirt: FormResult):
-    wished = seam_ratios(shirt, [SeamWish(name="side left", factor=1.0), SeamWish(name="side right", factor=1.02)])
+    wished = seam_ratios(
+        shirt, [SeamTable(name="side left", fullness=0.0), SeamTable(name="side right", fullness=0.02)]
+    )
     assert {name: len(edges) for name, edges in wished.full.items()} == {"back": 1}
     assert wished.ease == {"side left": 0.0, "side right": pytest.approx(0.02)}
 
 
 def test_gathers_widen_the_skirt_and_leave_the_bodice(mannequin: Mannequin):
     form = mannequin.form("basic_block", half=True)
-    wishes = [SeamWish(name=name, factor=1.5, gathered=True) for name in ("front waist", "back waist")]
+    wishes = [SeamTable(name=name, gather=1.5) for name in ("front waist", "back waist")]
     plain, full = (flatten_form(mannequin, form, fabric="woven", wishes=w, curves_mm=0.0) for w in ((), wishes))
     assert full.sewn is not None
     assert full.sewn.converged
@@ -241,7 +243,7 @@ def test_gathers_widen_the_skirt_and_leave_the_bodice(mannequin: Mannequin):
 def test_gathered_seams_are_smooth_in_soft_cloth_also_across_the_fold(fabric: str):
     mannequin = body_of_size(20.0)
     form = mannequin.form("basic_block", half=True)
-    wishes = [SeamWish(name=name, factor=1.5, gathered=True) for name in ("front waist", "back waist")]
+    wishes = [SeamTable(name=name, gather=1.5) for name in ("front waist", "back waist")]
     made = flatten_form(mannequin, form, fabric=fabric, wishes=wishes)
     assert made.sewn is not None
     assert made.sewn.converged

@@ -26,7 +26,7 @@ from warpflat.flat.model.wear import Wear
 from warpflat.flat.solver.options import RelaxOptions
 from warpflat.flat.surface.shapes import make_shape
 from warpflat.garment.construction.constraints import FixedLength
-from warpflat.garment.construction.ease import SeamWish
+from warpflat.garment.construction.details import SeamTable
 from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.mannequin.forms import form_from_mapping
@@ -90,7 +90,7 @@ def test_mirrored_pieces_are_recognised_as_pairs(mannequin: Mannequin, block: Ga
     assert shirt.pairs == (("sleeve_left", "sleeve_right"),)
     assert shirt.metrics()["pairs"] == [["sleeve_left", "sleeve_right"]]
     # Ease on one side only, and they are two patterns.
-    wishes = [SeamWish(name="armhole left", factor=1.05)]
+    wishes = [SeamTable(name="armhole left", fullness=0.05)]
     odd = flatten_form(mannequin, mannequin.form("tshirt"), fabric="interlock", wishes=wishes, curves_mm=0.0)
     assert odd.pairs == ()
 
@@ -281,7 +281,7 @@ def test_arguments_of_a_wrong_type_are_one_line(block: Garment, wrong: dict[str,
 
 def test_a_sewn_piece_is_not_edited_as_if_it_were_not(block: Garment, mannequin: Mannequin):
     """Its fullness, its folds and the other sides of its seams would be lost without a word."""
-    wish = SeamWish(name="front waist", factor=1.5, gathered=True)
+    wish = SeamTable(name="front waist", gather=1.5)
     full = flatten_form(mannequin, block.form, fabric="woven", wishes=[wish], curves_mm=0.0).pieces["front_skirt"]
     line = full.surface.lines["hip"]
     plan = CutPlan(name="hip", paths=(line,))
@@ -305,9 +305,9 @@ def test_a_cut_is_offered_for_what_it_wins_and_not_for_what_sewing_does():
     # A bust that stands out: no darts, and the bodice does not fit alone either.
     body = Mannequin.from_size("EU 38", bust=0.96, resolution_mm=35.0)
     wishes = [
-        SeamWish(name="front waist", factor=1.5, gathered=True),
-        SeamWish(name="back waist", factor=1.5, gathered=True),
-        SeamWish(name="shoulder left", factor=1.01),
+        SeamTable(name="front waist", gather=1.5),
+        SeamTable(name="back waist", gather=1.5),
+        SeamTable(name="shoulder left", fullness=0.01),
     ]
     form = body.form("basic_block", half=True)
     dress = flatten_form(body, form, fabric="woven", wishes=wishes, wear=Wear(), curves_mm=0.0)

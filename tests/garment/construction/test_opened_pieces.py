@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -105,6 +107,34 @@ def test_a_pocket_is_placed_from_the_centre_line_and_not_from_the_button_stand(f
     marks = add_pockets(pattern, [pocket]).piece("front", "").marks
     corners = [mark[0] for name, mark in marks.items() if name.startswith("pocket corner")]
     assert min(corners) == pytest.approx(0.07)
+
+
+@pytest.mark.parametrize(("length_mm", "open_below"), [(None, 0.5), (700, 0.2)])
+def test_buttons_go_on_below_a_seam_as_above_it(length_mm: float | None, open_below: float) -> None:
+    """They are evenly spaced through bodice and skirt, and what of the skirt they do not open stays sewn."""
+    bodice, skirt = (
+        panel("bodice", left="centre front", bust=points((0.0, 0.2), (0.3, 0.2))),
+        panel("skirt", left="centre front"),
+    )
+    halves = [(piece.name, SeamSide(piece=piece.name, edge="centre front")) for piece in (bodice, skirt)]
+    seams = [Seam(name=name, sides=((half,), (replace(half, mirrored=True),))) for name, half in halves]
+    pattern = Pattern(name="t", pieces={"": [bodice, skirt]}, seams=seams)
+    parts = [
+        OpeningPart(seam=name, piece=name, vertices=np.arange(2), before=before, whole=0.5)
+        for (name, _), before in zip(halves, (0.0, 0.5), strict=True)
+    ]
+    buttons = OpeningTable(kind="buttons", seam="centre front", length_mm=length_mm)
+    opened = mark_openings(pattern, [buttons], {"": [parts]})
+    depths = sorted(
+        before + 0.5 - float(mark[1])
+        for (name, _), before in zip(halves, (0.0, 0.5), strict=True)
+        for mark in opened.piece(name, "").marks.values()
+    )
+    assert np.ptp(np.diff(depths)) < 1e-9
+    assert min(abs(depth - 0.3) for depth in depths) < 1e-9
+    stand = opened.piece("skirt", "").edge("centre front button stand")
+    assert stand.length == pytest.approx(open_below)
+    assert {seam.name for seam in opened.seams} == ({"skirt"} if length_mm else set())
 
 
 def test_a_placket_too_short_for_two_buttons_is_refused() -> None:

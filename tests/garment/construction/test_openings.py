@@ -16,7 +16,7 @@ from warpflat.garment.construction.details import OpeningTable
 from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.openings import one_sided, part_at_centres, sewn_centres
-from warpflat.garment.construction.rings import find_rings, ring_line
+from warpflat.garment.construction.rings import find_rings
 from warpflat.garment.construction.to_pattern import pattern_of_garment
 from warpflat.garment.mannequin.forms import Form, PieceRecipe, shipped_form
 from warpflat.garment.mannequin.mannequin import Mannequin
@@ -191,10 +191,9 @@ def test_a_half_that_is_cut_twice_is_opened_once(mannequin: Mannequin, kind: str
 
 def test_two_rings_at_one_line_are_opened_each_by_its_own(mannequin: Mannequin, skirt: Garment, monkeypatch):
     found = find_rings(mannequin, skirt.form, skirt.positions)
-    waist, length = next((ring, length) for ring, length in found if ring_line(mannequin, ring) == "waist")
+    waist, length = found["waist"]
     shorter = waist[:0], 0.5 * length
-    monkeypatch.setattr(openings, "find_rings", lambda *_: [(waist, length), shorter])
-    monkeypatch.setattr(openings, "ring_line", lambda *_: "waist")
+    monkeypatch.setattr(openings, "find_rings", lambda *_: {"waist": (waist, length), "waist 2": shorter})
     more = openings.opened_rings(mannequin, skirt.form, skirt.positions, [ZIP])
     assert more["waist"] == pytest.approx(0.4)
     assert more.get("waist 2", 0.0) == 0.0

@@ -13,7 +13,8 @@ from warpflat.flat.flattening.flatten_piece import flatten
 from warpflat.garment.construction.constraints import Straight, straight_hems
 from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.garment import Garment
-from warpflat.garment.mannequin.forms import FormResult, form_from_mapping, shipped_form
+from warpflat.garment.mannequin.darts import FormDart
+from warpflat.garment.mannequin.forms import FormResult, PieceRecipe, form_from_mapping, shipped_form
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.shapes import shaped_form
 
@@ -79,6 +80,18 @@ def test_what_is_asked_for_of_a_hem_holds(body: Mannequin) -> None:
     asked = [Straight(piece="sleeve_left", line="wrist left", along="free")]
     assert [line.piece for line in straight_hems(form, asked)] == ["sleeve_right"]
     assert {line.line for line in straight_hems(body.form("tshirt"), [])} == {"biceps left", "biceps right"}
+
+
+def test_a_seam_that_a_dart_interrupts_is_no_hem() -> None:
+    """A sleeve in two at the elbow, the lower one with a dart there."""
+    lower = PieceRecipe(bricks=("elbow-wrist/arm-left-*",), datum="overarm left", open=("underarm left",))
+    upper = replace(lower, bricks=("armhole-elbow/arm-left-*",))
+    dart = FormDart(name="over", piece="lower", line="overarm left", at="elbow left", part=(0.0, 0.4), mirrored=False)
+    form = body_of_size(35.0).form(
+        replace(shipped_form("shirt"), pieces={"upper": upper, "lower": lower}, darts=(dart,))
+    )
+    assert {"elbow left", "elbow left 2"} <= set(form.pieces["lower"].edges)
+    assert [(hem.piece, hem.line) for hem in straight_hems(form, [])] == [("lower", "wrist left")]
 
 
 def test_short_sleeve_is_not_wrung_and_its_hem_is_straight(body: Mannequin) -> None:

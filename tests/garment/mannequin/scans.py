@@ -10,6 +10,7 @@ from unittest import mock
 import numpy as np
 import pytest
 import trimesh
+from bodies import had_by_all
 from body_copies import copy_of_body
 from body_tapes import armpit_and_crotch
 
@@ -33,7 +34,7 @@ def scan(name: str) -> tuple[np.ndarray, np.ndarray]:
 
 @functools.cache
 def _read(name: str) -> ReadBody:
-    return read_body(*scan(name), ScanOptions())
+    return had_by_all(f"scan {name}".encode(), lambda: read_body(*scan(name), ScanOptions()))
 
 
 @functools.cache

@@ -416,7 +416,7 @@ def test_a_trunk_that_is_no_body_is_refused_with_its_place() -> None:
     tyre = points.copy()
     tyre[(share > 0.66) & (share < 0.68) & (np.abs(points[:, 0]) < 0.2)] *= [1.6, 1.0, 1.6]
     with pytest.raises(InputError, match=r"does not show the trunk at 1\.1\d m"):
-        on_scan(tyre, faces)
+        on_scan(tyre, faces, facing="+z")
     # A waist of a half.
     thin = points.copy()
     middle = points[(share > 0.6) & (share < 0.64) & (np.abs(points[:, 0]) < 0.2), 2].mean()
@@ -425,7 +425,7 @@ def test_a_trunk_that_is_no_body_is_refused_with_its_place() -> None:
     thin[waist, 0] *= factor
     thin[waist, 2] = middle + (thin[waist, 2] - middle) * factor
     with pytest.raises(InputError, match=r"does not show the trunk at 1\.1\d m"):
-        on_scan(thin, faces)
+        on_scan(thin, faces, facing="+z")
 
 
 @needs_bodies

@@ -11,7 +11,7 @@ from armhole_curves import corner_degrees, depth_inside, sharpest_turn
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths
 from warpflat.flat.flattening.flatten_piece import flatten
-from warpflat.garment.construction.rings import find_rings, ring_line
+from warpflat.garment.construction.rings import find_rings
 from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.forms import form_from_mapping, shipped_form
 from warpflat.garment.mannequin.mannequin import Mannequin
@@ -20,8 +20,7 @@ from warpflat.garment.mannequin.neckline import Neckline, widen_neck
 
 def neck_length(mannequin: Mannequin, form) -> float:
     made = mannequin.form(form)
-    rings = find_rings(mannequin, made, {name: piece.surface.vertices for name, piece in made.pieces.items()})
-    return next(length for ring, length in rings if ring_line(mannequin, ring) == "neck")
+    return find_rings(mannequin, made, {name: piece.surface.vertices for name, piece in made.pieces.items()})["neck"][1]
 
 
 @pytest.mark.parametrize("size", ["EU 36", "JIS 5AR", "men 56"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +17,8 @@ from warpflat.pattern.drafting.layout import covered_rings, lay_out, nests
 from warpflat.pattern.drafting.marker import Cloth, cloth_needed, make_marker, unfold_piece
 from warpflat.pattern.drafting.piece_parts import Hole
 from warpflat.pattern.drafting.pieces import Pattern, Piece
+from warpflat.pattern.export.pattern_files import lay_markers
+from warpflat.pattern.export.pattern_json import write_pattern_json
 from warpflat.pattern.export.svg import write_marker_svg
 
 
@@ -161,3 +164,15 @@ def test_a_size_that_lies_within_a_larger_one_needs_no_more_cloth(
     monkeypatch.setattr("warpflat.pattern.drafting.marker.nest_on_strip", lambda *_, **__: next(found))
     cloth = cloth_needed(draft_garment(Pattern(name="dress", pieces=pieces)))
     assert cloth == {"38": {"": (needed, needed, 1.30 if needed == 1.20 else None)}, "42": {"": (1.20, 1.20, 1.30)}}
+
+
+def test_each_cloth_has_a_marker_of_its_own_whatever_it_is_called(tmp_path: Path) -> None:
+    """A fabric's name may have what no file's has, and two may differ in what files do not tell apart."""
+    fabrics = ("wool", "cotton/linen", "Cotton/Linen", "cötton/linen")
+    pieces = [polygon(f"p{k}", corners_of(0.2, 0.3), fabric=fabric) for k, fabric in enumerate(fabrics)]
+    write_pattern_json(draft_garment(Pattern(name="g", pieces={"": pieces})), tmp_path / "pattern.json")
+    files, _, plans = lay_markers(tmp_path / "pattern.json", Cloth(width=1.0), out=tmp_path / "out", seconds=1)
+    ends = ("", ".cotton_linen", ".Cotton_Linen_2", ".cotton_linen_3")
+    assert [file.name for file in files if file.suffix == ".svg"] == [f"g{end}.marker.svg" for end in ends]
+    assert all(file.is_file() for file in files)
+    assert not any("not_made" in plan for plan in plans)

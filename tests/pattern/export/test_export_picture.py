@@ -11,7 +11,6 @@ from export_meshes import cut_up_the_middle, dome, grid, mixed, surface
 from matplotlib.patches import Polygon
 
 from warpflat.core.sums import weighted_percentile
-from warpflat.flat.surface.half_edges import border_edges
 from warpflat.flat.surface.triangles import triangulate
 from warpflat.pattern.drafting.placement import (
     LabelRoom,
@@ -25,7 +24,7 @@ from warpflat.pattern.drafting.placement import (
 from warpflat.pattern.export.colours import SMALLEST_SCALE, VertexColours, energy_colours, energy_scale
 from warpflat.pattern.export.dressed import Body, crop_body
 from warpflat.pattern.export.figure import GREY, Pen, new_figure, write_figure
-from warpflat.pattern.export.geometry import face_areas, outline_edges
+from warpflat.pattern.export.geometry import face_areas
 from warpflat.pattern.export.letters import all_letters, is_drawn, note_on_names, titles
 from warpflat.pattern.export.packing import pack_boxes, pack_rows
 from warpflat.pattern.export.picture import DraftedOutline, PicturePiece, draw_figure, write_picture
@@ -419,15 +418,6 @@ def test_a_png_holds_the_pixels_its_resolution_and_who_wrote_it(tmp_path: Path, 
         assert image.info["dpi"] == pytest.approx((150, 150), abs=0.1)
         assert image.info["Software"] == "warpflat"
         np.testing.assert_array_equal(np.asarray(image), given[..., :3])
-
-
-def test_outline_is_the_border_with_holes_and_cracks() -> None:
-    whole = dome(9)
-    faces, _, _ = cut_up_the_middle(whole, 9, 4)
-    for mesh in (whole.faces, faces, np.delete(whole.faces, [20, 21], axis=0), mixed().faces, whole.faces[:0]):
-        expected = np.sort(border_edges(mesh), axis=1)
-        assert {tuple(edge) for edge in outline_edges(mesh)} == {tuple(edge) for edge in expected}
-    assert len(outline_edges(faces)) == 32 + 8
 
 
 def test_areas_and_averages_survive_slivers() -> None:

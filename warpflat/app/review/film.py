@@ -28,7 +28,7 @@ from warpflat.core import (
     read_apart,
     reading,
 )
-from warpflat.flat import triangulate
+from warpflat.flat import border_edges, triangulate
 from warpflat.pattern import (
     DRAFTED,
     DRAFTED_CLOTH,
@@ -39,7 +39,6 @@ from warpflat.pattern import (
     VertexColours,
     energy_colours,
     face_areas,
-    outline_edges,
     part_path,
 )
 
@@ -315,7 +314,7 @@ def _packed(
     painted = list[VertexColours]()
     for change, shape in zip(piece.changes, piece.shapes, strict=True):
         triangles, _ = triangulate(shape.faces)
-        edges = outline_edges(shape.faces)
+        edges = border_edges(shape.faces)
         topologies.append(
             {
                 "first": change,

@@ -11,6 +11,7 @@ import numpy as np
 from warpflat.app.review.film import FilmPiece, open_film
 from warpflat.app.review.page import read_run
 from warpflat.core import FloatArray, InputError, atomic_path, output_folder, reading, record_file
+from warpflat.flat import border_edges
 from warpflat.pattern import (
     DPI,
     FRAME_RATE,
@@ -21,7 +22,6 @@ from warpflat.pattern import (
     Scale,
     View,
     all_letters,
-    outline_edges,
     picture_of,
     write_moving_picture,
 )
@@ -86,7 +86,7 @@ def _images(pieces: Sequence[FilmPiece], times: Sequence[int], long_side: int) -
             counts = np.cumsum([0, *map(len, points)])
             joined = [np.where(faces >= 0, faces + first, -1) for faces, first in zip(shown, counts, strict=False)]
             together = np.concatenate(joined).astype(np.int32)
-            facets[numbers] = Facets.of(together, outline_edges(together))
+            facets[numbers] = Facets.of(together, border_edges(together))
         views.append(View.of_pattern(np.concatenate(points), facets[numbers], {}))
         densities.append(np.concatenate([piece.density(time) for piece in pieces]))
     low = np.min([view.low for view in views], axis=0)

@@ -127,7 +127,7 @@ def split_dart(scene: Scene, dart: str, line: str, *, at: str | None = None) -> 
     if at is None:
         own = scene_form(scene)[1].pieces.get(old.piece)
         # Whether the line is an edge of the piece, or a part of one.
-        bounds = own is not None and line in {own.parts.get(edge, edge) for edge in own.edges}
+        bounds = own is not None and line in {own.whole(edge) for edge in own.edges}
         second |= {"line": old.line, "towards": line} if bounds else {"line": line}
     else:
         second |= {"line": line, "at": at}
@@ -219,12 +219,12 @@ def _shares(dart: FormDart, garment: FormGarment) -> Mapping[str, tuple[str, flo
             piece, positions = form.pieces[placed.piece], garment.pieces[placed.piece].positions
             left, right = (piece.edges[leg] for leg in piece.darts[placed.name])
             edge = next(name for name, ids in piece.edges.items() if ids[-1] == left[0])
-            edge, width = piece.parts.get(edge, edge), polyline_length(positions[[left[0], right[-1]]])
+            edge, width = piece.whole(edge), polyline_length(positions[[left[0], right[-1]]])
             taken[placed.piece, edge] = taken.get((placed.piece, edge), 0.0) + width
     found = {}
     for (name, edge), width in taken.items():
         piece = form.pieces[name]
-        parts = [part for part in piece.edges if piece.parts.get(part, part) == edge]
+        parts = [part for part in piece.edges if piece.whole(part) == edge]
         length = sum(polyline_length(garment.pieces[name].positions[piece.edges[part]]) for part in parts)
         seam = next(
             (s.name for s in seams if any(side.piece == name and side.edge in parts for side in s.stretches)),

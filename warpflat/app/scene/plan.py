@@ -22,7 +22,7 @@ from warpflat.app.scene.load import (
 )
 from warpflat.app.scene.pattern_options import pattern_options
 from warpflat.app.scene.schema import PieceTable
-from warpflat.app.scene.seams import scene_constraints, scene_surface_seams, scene_wishes
+from warpflat.app.scene.seams import scene_constraints, scene_surface_seams
 from warpflat.app.scene.surface import scene_pieces, scene_sewn_panels, scene_surface, with_piece_tables
 from warpflat.core import InputError, StepError, optional_step, report_activity, without_side
 from warpflat.flat import (
@@ -46,7 +46,6 @@ from warpflat.garment import (
     Mannequin,
     OpeningTable,
     SeamTable,
-    SeamWish,
     SewnPanel,
     Straight,
     cap_wishes,
@@ -281,7 +280,7 @@ class GarmentPlan(Plan):
 
     mannequin: Mannequin
     form: FormResult
-    wishes: Sequence[SeamWish]
+    wishes: Sequence[SeamTable]
     constraints: Sequence[Constraint]
     openings: Sequence[OpeningTable]
     settings: Mapping[str, Any]
@@ -557,7 +556,7 @@ def plan_garment(
         check_names(drawing.names, form.pieces)
     with errors_named(f"{scene.where}: grain_angle"):
         check_fold_grain(find_fold_lines(form, plan), settings.grain_angle)
-    wishes = scene_wishes(settings.seams)
+    wishes = [*settings.seams]
     with errors_named(f"{scene.where}: seams"):
         wishes += cap_wishes(form, options["fabric"], wishes)
     with errors_named(scene.where):

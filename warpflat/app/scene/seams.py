@@ -1,4 +1,4 @@
-"""The tables `seams` and `constraints` of a scene, as wishes and constraints on named pieces and lines."""
+"""The tables `seams` and `constraints` of a scene, as seams and constraints on named pieces and lines."""
 
 from __future__ import annotations
 
@@ -6,17 +6,9 @@ from collections.abc import Collection, Mapping, Sequence
 
 from warpflat.app.scene.schema import ConstraintTable
 from warpflat.core import InputError, nearest
-from warpflat.garment import Constraint, FixedLength, SeamTable, SeamWish, Straight, Symmetric
+from warpflat.garment import Constraint, FixedLength, SeamTable, Straight, Symmetric
 
-__all__ = ["scene_constraints", "scene_surface_seams", "scene_wishes"]
-
-
-def scene_wishes(tables: Sequence[SeamTable]) -> list[SeamWish]:
-    """Return the fullness and gathers that a scene wants of a form's seams."""
-    return [
-        SeamWish(name=table.name, factor=table.factor, gathered=table.gathered, longer=table.longer, upper=True)
-        for table in tables
-    ]
+__all__ = ["scene_constraints", "scene_surface_seams"]
 
 
 def scene_surface_seams(tables: Sequence[SeamTable], piece: str) -> list[SeamTable]:

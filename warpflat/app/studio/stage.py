@@ -17,9 +17,9 @@ from warpflat.app.studio.glb import coloured_mesh
 from warpflat.app.studio.maps import MapScale, face_values, vertex_values
 from warpflat.app.studio.pick import Hit, pick_flat, pick_on_rays
 from warpflat.core import FloatArray, IntArray
-from warpflat.flat import Surface, triangulate, vertex_normals
+from warpflat.flat import Surface, border_edges, triangulate, vertex_normals
 from warpflat.garment import Body
-from warpflat.pattern import outline_edges, rows_on_table
+from warpflat.pattern import rows_on_table
 
 __all__ = ["Shown", "Stage"]
 
@@ -116,7 +116,7 @@ class Stage:
             space.append(piece.space)
             flat.append(self._flat(name, piece))
             colours.append(scale.rgb(piece.values))
-            edges.append(flat[-1][outline_edges(piece.frame.surface.faces)])
+            edges.append(flat[-1][border_edges(piece.frame.surface.faces)])
             count += len(piece.space)
         shared = np.concatenate(triangles), np.concatenate(colours)
         with self._server.atomic():

@@ -19,7 +19,6 @@ from warpflat.garment.construction.edges import (
     bezier,
     copies_sewn,
     direction,
-    edge_at,
     free_piece_name,
     joined,
     lengths_of,
@@ -27,11 +26,11 @@ from warpflat.garment.construction.edges import (
     sewn,
 )
 from warpflat.garment.construction.free_edges import (
-    OFF_END,
     Break,
     FreeChain,
     chain_allowance,
     chain_length,
+    crossed_at,
     free_chains,
     joined_line,
     marks_of,
@@ -40,12 +39,12 @@ from warpflat.garment.construction.free_edges import (
 from warpflat.garment.construction.strips import Strip, strip_edges, swept
 from warpflat.pattern import Edge, Pattern, Piece, SeamSide, drawn_length
 
-__all__ = ["with_collar", "with_hood"]
+__all__ = ["STANDS", "with_collar", "with_hood"]
 
 # A flat collar is drafted with the shoulders lapped by this angle [rad], about a centimetre at their ends: it rolls a little.
 _LAPPED = 0.10
-# Share of a convertible collar that stands up.
-_STANDS = 0.4
+#: Share of a convertible collar that stands up.
+STANDS = 0.4
 # A fall reaches at least so far below the seam of its stand [m].
 _COVERS = 0.004
 # The upper corners of a stand are rounded by this share of its height, a flat collar's by this share of its width.
@@ -114,8 +113,8 @@ def with_collar(
             outer = np.asarray(shapely.LineString(line).offset_curve(collar.width).simplify(2e-5).coords)
             edges = strip_edges(line, outer, rounded=_ROUND * collar.width, allowance=allowance)
         else:
-            back, grown = _rests_on(pattern, chain, like.size, (1.0 - 2.0 * _STANDS) * collar.width)
-            shape = _turned_down(length, collar.width, grown / back, collar.point + _STANDS * collar.width)
+            back, grown = _rests_on(pattern, chain, like.size, (1.0 - 2.0 * STANDS) * collar.width)
+            shape = _turned_down(length, collar.width, grown / back, collar.point + STANDS * collar.width)
             edges = shape.edges(allowance=allowance)
         return _piece(name, like, edges, quantity=4 if halves else 2, paired=halves)
 
@@ -189,10 +188,10 @@ def _with_stand(pattern: Pattern, chain: FreeChain, collar: FinishingTable) -> P
     pattern = added(pattern, draw)
     if collar.style != "shirt":
         return _sewn_on(pattern, chain, stand)
-    pattern = copies_sewn(pattern, f"{_words(fall)} edge", fall, *_AROUND)
+    pattern = copies_sewn(pattern, f"{fall} edge", fall, *_AROUND)
     upper_side = SeamSide(piece=stand, edge="upper", reversed=True)
     pattern = sewn(pattern, "collar to its stand", SeamSide(piece=fall, edge="lower"), upper_side, notches=(0.5,))
-    pattern = copies_sewn(pattern, f"{_words(stand)} right end", stand, "right end")
+    pattern = copies_sewn(pattern, f"{stand} right end", stand, "right end")
     return _sewn_on(pattern, chain, stand, ("left end",))
 
 
@@ -279,13 +278,11 @@ def _parted_at_front(pattern: Pattern, places: Sequence[Place]) -> tuple[Pattern
     """Return a pattern whose edges are parted at the centre front, the ends of chains there, and the edges that there are now."""
     breaks, now = list[Break](), list(places)
     for name, edge in places:
-        side = FreeChain(sides=(SeamSide(piece=name, edge=edge),), closed=False)
-        at = {size: marks_of(pattern, side, size, "centre front") for size in pattern.pieces}
-        lengths = {size: edge_at(pattern, (name, edge), size).length for size in pattern.pieces}
-        if any(len(row) != 1 or not OFF_END < row[0] < lengths[size] - OFF_END for size, row in at.items()):
+        at = crossed_at(pattern, (name, edge), "centre front")
+        if at is None:
             continue
         known = {each.name for each in pattern.piece(name, pattern.sample).edges}
-        pattern, broken = split_edge(pattern, (name, edge), {size: row[0] for size, row in at.items()})
+        pattern, broken = split_edge(pattern, (name, edge), at)
         breaks.append(broken)
         now += [(name, each.name) for each in pattern.piece(name, pattern.sample).edges if each.name not in known]
     return pattern, breaks, now
@@ -320,14 +317,10 @@ def _piece(
     try:
         return new_piece(name, like, edges, role, quantity=quantity, paired=paired, grain=grain)
     except InputError:
-        raise InputError(f"no {_words(name)} of these measures can be drawn along this neckline") from None
+        raise InputError(f"no {name.replace('_', ' ')} of these measures can be drawn along this neckline") from None
 
 
 def _sewn_on(pattern: Pattern, chain: FreeChain, name: str, layers: tuple[str, ...] = _AROUND) -> Pattern:
     """Return a pattern with both layers of a collar sewn to each other and its lower edge to the neckline."""
-    pattern = copies_sewn(pattern, f"{_words(name)} {'edge' if len(layers) > 1 else layers[0]}", name, *layers)
-    return sewn(pattern, _words(name), SeamSide(piece=name, edge="lower"), chain.sides)
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
+    pattern = copies_sewn(pattern, f"{name} {'edge' if len(layers) > 1 else layers[0]}", name, *layers)
+    return sewn(pattern, name, SeamSide(piece=name, edge="lower"), chain.sides)

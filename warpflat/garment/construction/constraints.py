@@ -279,15 +279,13 @@ def straight_hems(form: FormResult, asked: Sequence[Constraint]) -> list[Straigh
         form: the garment.
         asked: constraints of its lines; what is asked for of a hem holds instead.
     """
-    sewn = {(piece, edge) for seam in form.seams for piece, edge in zip(seam.pieces, seam.edges, strict=True)}
-    sewn |= {
-        (constraint.piece, getattr(constraint, "line", "")) for constraint in asked if hasattr(constraint, "piece")
-    }
+    on_lines = [each for each in asked if isinstance(each, Straight | FixedLength | Symmetric | DrawnLine)]
+    settled = {*form.seam_of_edges(), *((each.piece, each.line) for each in on_lines)}
     return [
         Straight(piece=name, line=edge, along="free" if piece.darts else "weft")
         for name, piece in form.pieces.items()
         for edge in piece.edges
-        if edge.split(" ")[0] in _SLEEVE_HEMS and (name, edge) not in sewn and edge not in sum(piece.darts.values(), ())
+        if edge.split(" ")[0] in _SLEEVE_HEMS and (name, edge) not in settled and edge not in piece.leg_edges
     ]
 
 

@@ -103,7 +103,7 @@ def crowded_darts(form: FormResult, positions: Mapping[str, FloatArray]) -> list
         if (dart.piece, dart.name) not in legs or dart.asked in found:
             continue
         piece, flat = form.pieces[dart.piece], positions[dart.piece]
-        armholes = [ids for edge, ids in piece.edges.items() if piece.parts.get(edge, edge).startswith("armhole")]
+        armholes = [ids for edge, ids in piece.edges.items() if piece.whole(edge).startswith("armhole")]
         if dart.name in piece.fisheyes or any(np.isin(legs[dart.piece, dart.name], ids).any() for ids in armholes):
             continue
         away = [

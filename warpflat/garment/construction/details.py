@@ -330,7 +330,11 @@ class SeamTable(Table):
     @property
     def ease(self) -> float:
         """The surplus length of the second line, as a share of the first."""
-        return self.factor - 1.0 if self.longer_line == 1 else 1.0 / self.factor - 1.0
+        return self.ease_if(self.longer_line)
+
+    def ease_if(self, longer: int) -> float:
+        """Return the surplus length of the second side, as a share of the first, where the first (0) or the second (1) is longer."""
+        return self.factor - 1.0 if longer == 1 else 1.0 / self.factor - 1.0
 
     @model_validator(mode="after")
     def _one_way(self) -> SeamTable:

@@ -124,7 +124,7 @@ def plan_curves(
     """
     ruled = {(each.piece, each.line) for each in constraints if isinstance(each, Straight | FixedLength)}
     girths = [each for each in constraints if isinstance(each, KeptGirth)]
-    sewn = _seam_of_edge(form)
+    sewn = form.seam_of_edges()
     plans = []
     for name, piece in form.pieces.items():
         bound = bounds[name]
@@ -135,7 +135,7 @@ def plan_curves(
         levels = np.concatenate([np.empty(0, dtype=np.int32), *measured])
         on_fold = set() if piece.fold is None else set(piece.edges[piece.fold].tolist())
         for edge, vertices in _open_edges(form, name, positions[name]):
-            part = piece.parts.get(edge, edge)
+            part = piece.whole(edge)
             if (name, edge) in ruled or len(vertices) < 4 or part.startswith(SHAPED_EDGES):
                 continue
             points, grid = positions[name][vertices], piece.grid_vertices[vertices]
@@ -184,8 +184,7 @@ def measure_curves(
     """
     import shapely
 
-    seam_of_edge = _seam_of_edge(form)
-    measured = []
+    sewn, measured = form.seam_of_edges(), []
     for plan, result in zip(plans, results, strict=True):
         place, after = (plan.line.piece, plan.line.line), positions[plan.line.piece][plan.line.vertices]
         # Both shapes are laid upon each other as near as they come.
@@ -194,7 +193,7 @@ def measure_curves(
         measured.append(
             DrawnCurve(
                 place=".".join(place),
-                seam=seam_of_edge.get(place, ""),
+                seam=sewn.get(place, ""),
                 book=plan.book,
                 straight=plan.straight,
                 away_mm=1e3 * plan.away,
@@ -207,18 +206,11 @@ def measure_curves(
     return tuple(measured)
 
 
-def _seam_of_edge(form: FormResult) -> dict[tuple[str, str], str]:
-    """Return the seams of edges that are sewn, by piece and edge."""
-    sides = ((seam, run.edges) for seam in form.seams for run in seam.runs)
-    return {(name, edge): seam.name for seam, edges in sides for name, edge in zip(seam.pieces, edges, strict=True)}
-
-
 def _open_edges(form: FormResult, name: str, flat: FloatArray) -> Iterator[tuple[str, IntArray]]:
     """Yield the edges of a piece that are neither a fold nor legs of darts, in parts where they have corners."""
     piece = form.pieces[name]
-    legs = {leg for dart in piece.darts.values() for leg in dart}
     for edge, vertices in piece.edges.items():
-        if edge == piece.fold or edge in legs:
+        if edge == piece.fold or edge in piece.leg_edges:
             continue
         angles = np.abs(turning_angles(flat[vertices]))
         sharp = angles > CORNER

@@ -14,6 +14,7 @@ import numpy as np
 
 from warpflat.core import BoolArray, FloatArray, IntArray, arc_lengths, line_name, other_side, unit
 from warpflat.flat import grid_quads, triangulate, vertex_normals
+from warpflat.garment.construction.collars import STANDS
 from warpflat.garment.mannequin.slicer import UP
 from warpflat.pattern import ViewedPiece
 
@@ -259,7 +260,7 @@ def _collar(wish: FinishingTable, chain: _Chain, level: FloatArray) -> Iterator[
     else:
         stand, fall = wish.width, wish.fall
         if wish.style == "convertible":
-            stand, fall = 0.4 * wish.width, 0.6 * wish.width
+            stand, fall = STANDS * wish.width, (1.0 - STANDS) * wish.width
         inwards = np.sign(0.5 * arc[-1] - arc)[:, None] * unit(np.gradient(chain.points, axis=0))
         top = chain.points + stand * (1.0 - (wish.style == "convertible") * ends) * UP
         long = fall * 1.2 + ends * (wish.point - fall * 1.2)

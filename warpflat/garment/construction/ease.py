@@ -10,6 +10,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest
 from warpflat.flat import Fabric
+from warpflat.garment.construction.details import SeamTable
 from warpflat.garment.construction.form_plan import plan_form
 from warpflat.garment.construction.fullness import FullEdge
 from warpflat.garment.construction.sewn import Stitching
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from warpflat.garment.mannequin.pieces import FormPiece
     from warpflat.pattern import Seam, SeamSide
 
-__all__ = ["CAP_PART", "SeamRatios", "SeamWish", "cap_wishes", "measure_ease", "seam_ratios"]
+__all__ = ["CAP_PART", "SeamRatios", "cap_wishes", "measure_ease", "seam_ratios"]
 
 
 #: A sleeve's cap is eased in between its notches, at these shares of the armhole from underarm to underarm; below them cap
@@ -28,25 +29,6 @@ CAP_PART = (0.2, 0.8)
 # What a woven cap has more than its armhole unless something else is asked: 16 mm on a child, 25 on EU 38, 30 on a heavy
 # man, of the 15 to 40 mm that pattern books give (Aldrich; Armstrong). A knit's cap has as much as its armhole.
 _WOVEN_CAP = 0.055
-
-
-@dataclass(frozen=True, kw_only=True)
-class SeamWish:
-    """A wish for one side of a seam to be longer than the other.
-
-    Attributes:
-        name: the seam's, as in the pattern.
-        factor: length of the longer side over that of the other: 1.02 for an ease of 2 %.
-        gathered: the fullness falls on through the piece; otherwise it is eased in near the seam.
-        longer: the piece that is longer, or "piece.edge"; the seam's second side if not given.
-        upper: at a sleeve's cap the fullness lies above the notches only, see `CAP_PART`; elsewhere this says nothing.
-    """
-
-    name: str
-    factor: float
-    gathered: bool = False
-    longer: str | None = None
-    upper: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -78,15 +60,14 @@ class SeamRatios:
         ]  # fmt: skip
 
 
-def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
+def seam_ratios(form: FormResult, wishes: Sequence[SeamTable]) -> SeamRatios:
     """Look up wishes in a form: the ratio of lengths of each of its seams, and the edges with fullness.
 
     A pattern's seam may be several of the form's (a sleeve's cap lies at the front and at the back): all get the same
     ratio.
 
     Raises:
-        InputError: there is no such seam (names the nearest), it is named twice, a factor below 1, or `longer` is not
-            one of its sides.
+        InputError: there is no such seam (names the nearest), it is named twice, or `longer` is not one of its sides.
     """
     plan = plan_form(form)
     by_name = {seam.name: seam for seam in plan.seams}
@@ -103,10 +84,8 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
             raise InputError(f"there is no seam {wish.name!r}; {nearest(wish.name, by_name)}")
         if name in ease:
             raise InputError(f"seam {name!r} is named twice; give its fullness or gather once")
-        if not 1.0 <= wish.factor <= 5.0:
-            raise InputError(f"seam {name!r}: one side is {wish.factor:g} times as long as the other; must be 1 to 5")
         longer = _longer_side(by_name[name], wish.longer)
-        ease[name] = wish.factor - 1.0 if longer == 1 else 1.0 / wish.factor - 1.0
+        ease[name] = wish.ease_if(longer)
         for number, (seam, first_side) in enumerate(plan.of_form):
             if seam.name != name:
                 continue
@@ -114,7 +93,7 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
             ratios[number] = [wish.factor if side == 0 else 1.0 / wish.factor] * len(here.runs)
             if wish.factor == 1.0:
                 continue  # as long as on the body: nothing to ease in
-            if wish.upper and name in caps and longer == 1 and not wish.gathered:
+            if name in caps and longer == 1 and not wish.gathered:
                 eased[name] = _along_seam(
                     caps[name].sides[1][0], _cap_part(form.pieces[here.pieces[side]], here.runs[0].edges[side])
                 )
@@ -144,7 +123,7 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
     )  # fmt: skip
 
 
-def cap_wishes(form: FormResult, fabric: Fabric, wishes: Sequence[SeamWish] = ()) -> list[SeamWish]:
+def cap_wishes(form: FormResult, fabric: Fabric, wishes: Sequence[SeamTable] = ()) -> list[SeamTable]:
     """Return wishes for the sleeves' caps that none of `wishes` is about, as the cloth needs them: none for a knit.
 
     Raises:
@@ -157,7 +136,7 @@ def cap_wishes(form: FormResult, fabric: Fabric, wishes: Sequence[SeamWish] = ()
     also = {seam.name: plan.of_form[i][0].name for i, seam in enumerate(form.seams)}
     asked = {also.get(wish.name, wish.name) for wish in wishes}
     caps = [seam.name for seam in plan.seams if _is_cap(form, seam) and seam.name not in asked]
-    return [SeamWish(name=name, factor=1.0 + _WOVEN_CAP, upper=True) for name in caps]
+    return [SeamTable(name=name, fullness=_WOVEN_CAP) for name in caps]
 
 
 def _is_cap(form: FormResult, seam: Seam) -> bool:

@@ -23,6 +23,7 @@ __all__ = [
     "SAME_PIECE",
     "SHORT",
     "Place",
+    "above_and_below",
     "added",
     "backwards",
     "beside",
@@ -33,6 +34,7 @@ __all__ = [
     "downwards",
     "drawn_on",
     "edge_at",
+    "falling",
     "free_piece_name",
     "in_sizes",
     "joined",
@@ -137,11 +139,15 @@ def runs_down(piece: Piece, points: FloatArray) -> bool:
     return bool((points[-1] - points[0]) @ up_and_across(piece)[0] < 0.0)
 
 
+def falling(piece: Piece, points: FloatArray) -> FloatArray:
+    """Return a line of a piece from its upper end."""
+    return points if runs_down(piece, points) else points[::-1]
+
+
 def downwards(piece: Piece, name: str) -> tuple[FloatArray, bool]:
     """Return the points of an edge from its upper end, and whether it runs that way itself."""
     points = piece.edge(name).points
-    down = runs_down(piece, points)
-    return points[:: 1 if down else -1], down
+    return falling(piece, points), runs_down(piece, points)
 
 
 def edge_at(pattern: Pattern, at: SeamSide | Place, size: str | None = None) -> Edge:
@@ -170,6 +176,12 @@ def neighbour(piece: Piece, edge: str, end: int) -> tuple[str, int]:
 def beside(piece: Piece, *chain: str) -> tuple[str, str]:
     """Return the names of the edges before and after some that follow each other."""
     return neighbour(piece, chain[0], 0)[0], neighbour(piece, chain[-1], 1)[0]
+
+
+def above_and_below(piece: Piece, edge: str) -> tuple[str, str]:
+    """Return the names of the edges that meet another one at its upper and at its lower end."""
+    before, after = beside(piece, edge)
+    return (before, after) if runs_down(piece, piece.edge(edge).points) else (after, before)
 
 
 def polygon_edges(names: Sequence[str], corners: FloatArray, **how: Any) -> list[Edge]:
@@ -257,12 +269,12 @@ def sewn(pattern: Pattern, name: str, first: Sides, second: Sides, **how: Any) -
 
     Args:
         pattern: with its pieces.
-        name: what the seam is to be called.
+        name: what the seam is to be called, in words or as a piece is.
         first, second: its sides.
         how: other attributes of a :class:`Seam`.
     """
     rows = [(row,) if isinstance(row, SeamSide) else row for row in (first, second)]
-    name = find_unused_name(name, {seam.name for seam in pattern.seams})
+    name = find_unused_name(name.replace("_", " "), {seam.name for seam in pattern.seams})
     return replace(pattern, seams=[*pattern.seams, Seam(name=name, sides=(rows[0], rows[1]), **how)])
 
 

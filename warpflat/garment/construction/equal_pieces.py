@@ -8,7 +8,7 @@ from itertools import islice, pairwise, product
 
 import numpy as np
 
-from warpflat.core import FloatArray, arc_lengths, line_name, points_at_lengths
+from warpflat.core import FloatArray, arc_lengths, line_name, points_at_lengths, resample
 from warpflat.garment.construction.edges import SAME_LINE
 from warpflat.pattern import Pattern, Piece, Seam, SeamSide
 
@@ -195,7 +195,7 @@ def _complex(points: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.complex12
 
 
 def _samples(points: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
-    return _complex(points_at_lengths(points, np.linspace(0.0, float(arc_lengths(points)[-1]), _SAMPLES)))
+    return _complex(resample(points, np.linspace(0.0, 1.0, _SAMPLES)))
 
 
 def _averaged(head: Piece, copies: Sequence[Copy]) -> tuple[Piece, float]:

@@ -99,11 +99,10 @@ def with_facings(
             on_facing = SeamSide(piece=title, edge=each)
             parts[name, each] = SeamSide(piece=name, edge=f"facing {each}", reversed=True) if grown_on else on_facing
         side = SeamSide(piece=name, edge=edge)
-        pattern = sewn(pattern, title.replace("_", " "), side, parts[name, edge], notches=centre_notch(sample))
+        pattern = sewn(pattern, title, side, parts[name, edge], notches=centre_notch(sample))
         if stand is not None and not grown_on:
             side = replace(side, edge=stand.edge)
-            words = f"{name} {stand.edge} facing".replace("_", " ")
-            pattern = sewn(pattern, words, side, replace(side, piece=title))
+            pattern = sewn(pattern, f"{name} {stand.edge} facing", side, replace(side, piece=title))
     return sewn_alike(pattern, shell, parts, gaps, f"{places[0][1]} facing")
 
 
@@ -148,7 +147,7 @@ def with_stand_facings(pattern: Pattern, stands: Sequence[Stand]) -> Pattern:
         pattern = _faced(pattern, stand.piece, [stand.edge], stand.width, title, stand, sewn_in=False)
         if not stand.grown_on:
             side = SeamSide(piece=stand.piece, edge=stand.edge)
-            pattern = sewn(pattern, title.replace("_", " "), side, replace(side, piece=title))
+            pattern = sewn(pattern, title, side, replace(side, piece=title))
     return pattern
 
 

@@ -219,7 +219,7 @@ def _with_strip(
     A strip that is wider than the cloth is cut as equal panels, of which one is drawn. One that is laid in pleats begins and ends in the
     inner fold of a pleat, and so does each of its panels: no seam of them shows.
     """
-    name, words = free_piece_name(pattern, wish.name), free_piece_name(pattern, wish.name).replace("_", " ")
+    name = free_piece_name(pattern, wish.name)
     lengths = {size: wish.share * chain_length(pattern, chain, size) for size in pattern.pieces}
     allowances = {size: chain_allowance(pattern, chain, size) for size in pattern.pieces}
     folded, (weft, warp), role = _STRIPS[wish.kind]
@@ -297,11 +297,11 @@ def _with_strip(
     whole = tuple(SeamSide(piece=name, edge="lower", copy=copy) for copy in range(panels))
     # The second side is the longer one.
     sides, longer = ((chain.sides, whole), wish.share) if wish.share > 1.0 else ((whole, chain.sides), 1.0 / wish.share)
-    pattern = sewn(pattern, words, *sides, ease=longer - 1.0, notches=notches, size_notches=size_notches)
+    pattern = sewn(pattern, name, *sides, ease=longer - 1.0, notches=notches, size_notches=size_notches)
     for copy in range(panels if ring else panels - 1):
         following = SeamSide(piece=name, edge="left end", reversed=True, copy=(copy + 1) % panels)
         end = SeamSide(piece=name, edge="right end", copy=copy)
-        pattern = sewn(pattern, f"{words} ends", end, following, notches=() if wish.pleat else None)
+        pattern = sewn(pattern, f"{name} ends", end, following, notches=() if wish.pleat else None)
     return pattern
 
 

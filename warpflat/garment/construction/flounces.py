@@ -156,7 +156,7 @@ def _with_panel(
     pattern = redrawn(pattern, name, draw)
     pattern = sewn(
         pattern,
-        title.replace("_", " "),
+        title,
         tuple(SeamSide(piece=name, edge=side.edge) for side in own),
         tuple(SeamSide(piece=title, edge=called, reversed=True, copy=copy) for copy in range(count)),
         notches=centre_notch(sample) if count == 1 else None,
@@ -164,9 +164,7 @@ def _with_panel(
     for copy in range(count - 1):
         # What is last along the shell meets what is first of the next one.
         last = SeamSide(piece=title, edge=ends[1], reversed=True, copy=copy)
-        pattern = sewn(
-            pattern, f"{title.replace('_', ' ')} ends", last, SeamSide(piece=title, edge=ends[0], copy=copy + 1)
-        )
+        pattern = sewn(pattern, f"{title} ends", last, SeamSide(piece=title, edge=ends[0], copy=copy + 1))
     return pattern, _Panel(name=title, ends=ends, count=count)
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from warpflat.core import InputError, part_between
 from warpflat.garment.construction.edges import (
     ON,
+    above_and_below,
     downwards,
     free_piece_name,
-    neighbour,
     new_piece,
     redrawn,
 )
@@ -36,7 +36,7 @@ def with_flies(pattern: Pattern) -> Pattern:
         sides = seam.stretches
         in_front = all("front" in re.split("[ _]", side.piece) for side in sides)
         # Waistbands that are sewn to the edge above.
-        above = _above(pattern.piece(sides[0].piece, pattern.sample), sides[0].edge)
+        above, _ = above_and_below(pattern.piece(sides[0].piece, pattern.sample), sides[0].edge)
         bands = [
             other.piece
             for joint in pattern.seams
@@ -50,19 +50,14 @@ def with_flies(pattern: Pattern) -> Pattern:
     return pattern
 
 
-def _above(piece: Piece, name: str) -> str:
-    """Return the name of the edge above another one."""
-    return neighbour(piece, name, 0 if downwards(piece, name)[1] else 1)[0]
-
-
 def _with_fly(pattern: Pattern, seam: Seam, length: float, band: str) -> Pattern:
     import shapely
 
     side, (facing, shield) = seam.sides[1][0], (free_piece_name(pattern, name) for name in ("fly_facing", "fly_shield"))
 
     def fly(piece: Piece) -> tuple[Piece, Piece]:
-        points = downwards(piece, side.edge)[0]
-        centre, waist = shapely.LineString(points), shapely.LineString(piece.edge(_above(piece, side.edge)).points)
+        points, above = downwards(piece, side.edge)[0], above_and_below(piece, side.edge)[0]
+        centre, waist = shapely.LineString(points), shapely.LineString(piece.edge(above).points)
         # As far as the facing's lower end turns to the edge in a quarter of a circle.
         along = shapely.LineString(part_between(points, 0.0, length - _WIDE))
         region = shapely.Polygon(piece.outline).intersection(along.buffer(_WIDE))

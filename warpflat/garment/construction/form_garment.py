@@ -21,8 +21,9 @@ from warpflat.garment.construction.constraints import (
     straight_hems,
 )
 from warpflat.garment.construction.darts import dart_constraints, dart_pairs, measure_darts
+from warpflat.garment.construction.details import SeamTable
 from warpflat.garment.construction.drawn_curves import CURVES_MM, Curves, measure_curves, plan_curves
-from warpflat.garment.construction.ease import SeamRatios, SeamWish, seam_ratios
+from warpflat.garment.construction.ease import SeamRatios, seam_ratios
 from warpflat.garment.construction.finishing import with_plackets
 from warpflat.garment.construction.fullness import give_fullness
 from warpflat.garment.construction.garment import Garment
@@ -158,7 +159,7 @@ def flatten_form(
     callback: Callable[[str, Progress], bool | None] | None = None,
     device: str | None = None,
     sewn: bool = True,
-    wishes: Sequence[SeamWish] = (),
+    wishes: Sequence[SeamTable] = (),
     constraints: Sequence[Constraint] = (),
     curves_mm: float = CURVES_MM,
     known: Mapping[str, Flattening] | None = None,
@@ -185,7 +186,7 @@ def flatten_form(
     expect(form, FormResult, "form", "what Mannequin.form gives")
     expect(mannequin, Mannequin, "mannequin", "a Mannequin")
     expect_callback(callback)
-    expect_each(wishes, SeamWish, "wishes", "a SeamWish")
+    expect_each(wishes, SeamTable, "wishes", "a SeamTable")
     kinds = (DartMouth, FixedLength, Straight, Symmetric)
     expect_each(constraints, kinds, "constraints", "a Straight, FixedLength, Symmetric or DartMouth")
     wished = seam_ratios(form, wishes)

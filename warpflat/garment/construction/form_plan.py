@@ -10,16 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.core import InputError, find_unused_name, nearest
+from warpflat.garment.construction.edges import Place
 from warpflat.pattern import HEMMED_LEVELS, EdgeRules, Seam, SeamSide
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.forms import FormResult
 
-__all__ = ["EdgePlan", "FormPlan", "Sides", "check_fold_grain", "find_fold_lines", "plan_form"]
-
-Sides = tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]]
-#: Names of a piece and of its edge.
-Place = tuple[str, str]
+__all__ = ["EdgePlan", "FormPlan", "check_fold_grain", "find_fold_lines", "plan_form"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,14 +117,11 @@ def _plan_edges(form: FormResult, name: str, sewing: _SewnEdges, rules: EdgeRule
     heights = {
         edge: float(np.mean(piece.surface.vertices[ids][:, 1]))
         for edge, ids in piece.edges.items()
-        if piece.parts.get(edge, edge) == edge
-        and edge.split(" ")[0] in HEMMED_LEVELS
-        and not sewing.covers((name, edge))
+        if piece.whole(edge) == edge and edge.split(" ")[0] in HEMMED_LEVELS and not sewing.covers((name, edge))
     }
     lowest = min(heights, key=lambda edge: heights[edge], default=None)
-    legs = {leg for dart in piece.darts.values() for leg in dart}
     for edge, ids in piece.edges.items():
-        whole = piece.parts.get(edge, edge)
+        whole = piece.whole(edge)
         parts = sewing.parts((name, edge), len(ids))
         # The edge's own name stays with what is sewn.
         keeper = next((number for number, (_, _, sewn) in enumerate(parts) if sewn), 0)
@@ -135,7 +129,7 @@ def _plan_edges(form: FormResult, name: str, sewing: _SewnEdges, rules: EdgeRule
             part = edge if number == keeper else find_unused_name(edge, taken)
             taken.add(part)
             kind = "seam" if sewn else "fold" if edge == piece.fold else "hem" if whole == lowest else "seam"
-            kind = "dart" if edge in legs else rules.kind(name, part, kind, whole=whole)
+            kind = "dart" if edge in piece.leg_edges else rules.kind(name, part, kind, whole=whole)
             plans.append(EdgePlan(name=part, source=edge, whole=whole, first=first, last=last, kind=kind))
     return tuple(plans)
 
@@ -263,7 +257,7 @@ def _plan_seams(
         hub = next((side[0] for side in both if side[0].place in sewing.hubs), None)
         of_form.append((number, 0) if hub is None else (hub.place, 1 - hub.side))
         if hub is None:
-            sides: Sides = (chain(both[0]), chain(both[1]))
+            sides = chain(both[0]), chain(both[1])
         else:
             around = [chain(sewing.partners(s), turned=s.against) for s in sewing.by_edge[hub.place]]
             sides = (sum(around, ()), (SeamSide(piece=hub.piece, edge=hub.edge),))

@@ -32,11 +32,11 @@ from warpflat.garment.construction.edges import (
 from warpflat.pattern import Pattern, Seam, SeamSide, drawn_length
 
 __all__ = [
-    "OFF_END",
     "Break",
     "FreeChain",
     "chain_allowance",
     "chain_length",
+    "crossed_at",
     "free_chain",
     "free_chains",
     "joined_line",
@@ -49,7 +49,7 @@ _Corner = tuple[str, str, bool, int]
 #: Where chains end though the cloth goes on, as at a slit: piece, edge, and the end of the edge (0 or 1).
 Break = tuple[str, str, int]
 
-#: A line meets an edge inside it, not at its ends, beyond this distance [m].
+# A line meets an edge inside it, not at its ends, beyond this distance [m].
 OFF_END = 2e-3
 # Directions at the ends of edges are those of their first or last so much [m].
 _NEAR_END = 0.004
@@ -232,6 +232,17 @@ def marks_of(pattern: Pattern, chain: FreeChain, size: str, line: str) -> list[f
                 found.append(at)
         before += polyline_length(points)
     return sorted(found)
+
+
+def crossed_at(pattern: Pattern, place: Place, line: str) -> dict[str, float] | None:
+    """Return by size where a line of its piece crosses an edge [m], clear of both ends; None where it does not in every size."""
+    found, chain = dict[str, float](), FreeChain(sides=(SeamSide(piece=place[0], edge=place[1]),), closed=False)
+    for size in pattern.pieces:
+        at, length = marks_of(pattern, chain, size, line), edge_at(pattern, place, size).length
+        if len(at) != 1 or not OFF_END < at[0] < length - OFF_END:
+            return None
+        found[size] = at[0]
+    return found
 
 
 def joined_line(pattern: Pattern, chain: FreeChain, size: str, *, lapped: float = 0.0) -> FloatArray:

@@ -23,7 +23,7 @@ from warpflat.core import (
 from warpflat.flat import Flattening, run_metrics, separate
 from warpflat.garment.construction.edges import SAME_PIECE
 from warpflat.garment.construction.laid_as_cut import CutPattern
-from warpflat.garment.construction.mirror import even_sides, mirror_images
+from warpflat.garment.construction.mirror import even_sides, image_laid, mirror_images
 from warpflat.garment.construction.sewn import MeasuredSeam, Sewn, Stitching
 
 if TYPE_CHECKING:
@@ -123,11 +123,10 @@ class Garment:
         One of the two is enough for the table: cut it twice, the second time turned over.
         """
         found, names = [], list(self.pieces)
-        for first in names:
-            second, partners = self.images.get(first, (first, None))
+        for first, (second, partners) in self.images.items():
             if names.index(second) > names.index(first):
-                a, b = self.pieces[first].positions * [-1.0, 1.0], self.pieces[second].positions[partners]
-                if np.abs((a - a.mean(axis=0)) - (b - b.mean(axis=0))).max() < SAME_PIECE:
+                own = self.pieces[first].positions
+                if np.abs(own - image_laid(own, self.pieces[second].positions, partners)).max() < SAME_PIECE:
                     found.append((first, second))
         return tuple(found)
 

@@ -75,10 +75,7 @@ def loose_armholes(mannequin: Mannequin, form: FormResult, positions: Mapping[st
 def _kept(level: str, edges: RowEdges | None, factor: float, positions: Mapping[str, FloatArray]) -> KeptGirth:
     """Return the constraint that a level has its length in the pattern times a factor."""
     assert edges is not None
-    lengths = {
-        name: factor * np.linalg.norm(positions[name][ends[:, 0]] - positions[name][ends[:, 1]], axis=1)
-        for name, ends in edges.ends.items()
-    }
+    lengths = {name: factor * row for name, row in edges.lengths_of_pieces(positions).items()}
     return KeptGirth(level=level, edges=edges.ends, shares=edges.shares, lengths=lengths)
 
 

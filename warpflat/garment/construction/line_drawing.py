@@ -17,13 +17,14 @@ from warpflat.core import (
     arc_lengths,
     line_name,
     other_side,
-    points_at_lengths,
+    resample,
     unit,
     without_side,
 )
 from warpflat.flat import area_vectors, border_loops, judge, triangulate, vertex_normals
 from warpflat.garment.construction.button_stand import button_depths
 from warpflat.garment.construction.drawn_finishing import Rises, finishing_views, lost_along
+from warpflat.garment.construction.edges import lengths_of
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.mark_openings import TIE_WIDTH
 from warpflat.garment.construction.openings import place_opening
@@ -207,9 +208,12 @@ def _openings(garment: FormGarment, sign: float) -> Iterator[ViewedPiece]:
             continue
         parts = place_opening(garment.form, opening, garment.positions)
         end = min(opening.start + opening.length, sum(part.whole for part in parts))
-        lines = list[FloatArray]()
-        for part in parts:
-            arc = part.before + arc_lengths(garment.positions[part.piece][part.vertices])
+        lines, at_bust = list[FloatArray](), list[float]()
+        arcs = [part.before + arc_lengths(garment.positions[part.piece][part.vertices]) for part in parts]
+        for part, arc in zip(parts, arcs, strict=True):
+            on_bust = np.isin(garment.form.pieces[part.piece].grid_vertices[part.vertices], bust)
+            at_bust += arc[on_bust].tolist()
+        for part, arc in zip(parts, arcs, strict=True):
             seen = garment.form.pieces[part.piece].surface.vertices[part.vertices, :2] * [sign, 1.0]
             # A side seam is the outline of both views.
             if _towards(garment, part.piece, part.vertices, sign).mean() < _EDGE_ON:
@@ -224,9 +228,7 @@ def _openings(garment: FormGarment, sign: float) -> Iterator[ViewedPiece]:
             if opening.kind == "zip":
                 shapes += [(float(tooth), _BAR / 3) for tooth in np.arange(opening.start, end, _TOOTH)]
             if opening.kind == "buttons":
-                grid = garment.form.pieces[part.piece].grid_vertices
-                at_bust = arc[np.isin(grid[part.vertices], bust)]
-                depths = button_depths(opening, end, float(at_bust[0]) if len(at_bust) else None)
+                depths = button_depths(opening, end, next(iter(at_bust), None))
                 shapes = [(depth, 0.5 * opening.button * _CIRCLE) for depth in depths.tolist()]
             for at, shape in shapes:
                 if arc[0] <= at <= arc[-1]:
@@ -243,10 +245,7 @@ def _bands(pattern: Pattern, size: str) -> dict[str, float]:
             band, shell = ([pattern.piece(side.piece, size) for side in row] for row in (own, other))
             if any(piece.on_fold for piece in shell) or {piece.role for piece in shell} != {"shell"}:
                 continue
-            lengths = [
-                sum(piece.edge(side.edge).length for piece, side in zip(pieces, row, strict=True))
-                for pieces, row in ((band, own), (shell, other))
-            ]
+            lengths = [sum(lengths_of(pattern, row, size)) for row in (own, other)]
             lines = {line_name(side.edge) for side in other}
             if (
                 all(piece.role in ("strip", "cuff") for piece in band)
@@ -273,7 +272,7 @@ def _pockets(garment: FormGarment, pieces: Sequence[Piece], sign: float) -> Iter
         surface = flat.surface
         normals = vertex_normals(surface.vertices, triangulate(surface.faces)[0])[flat.vertex_origin]
         lift = LinearNDInterpolator(flat.positions, np.hstack([surface.vertices[flat.vertex_origin], normals]))
-        lifted = [lift(points_at_lengths(line, np.linspace(0.0, arc_lengths(line)[-1], 41))) for line in lines]
+        lifted = [lift(resample(line, np.linspace(0.0, 1.0, 41))) for line in lines]
         lifted = [row[np.isfinite(row).all(axis=1)] for row in lifted]
         if other_side(piece.name) not in {piece.name, *(each.name for each in pieces)} or on_fold:
             lifted += [row * [-1.0, 1.0, 1.0, -1.0, 1.0, 1.0] for row in lifted]

@@ -94,8 +94,8 @@ def add_lining(pattern: Pattern, cloth: str) -> Pattern:
     for name, facings in faced.items():
         for facing, inner in facings.items():
             sides = SeamSide(piece=facing, edge=INNER), SeamSide(piece=names[name], edge=inner, reversed=True)
-            words = f"lining to {facing}".replace("_", " ")
-            whole = sewn(whole, words, *sides, notches=centre_notch(pattern.piece(name, pattern.sample)))
+            notch = centre_notch(pattern.piece(name, pattern.sample))
+            whole = sewn(whole, f"lining to {facing}", *sides, notches=notch)
     return whole
 
 

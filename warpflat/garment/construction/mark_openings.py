@@ -13,17 +13,18 @@ from warpflat.garment.construction.button_stand import bust_depth, button_depths
 from warpflat.garment.construction.details import OpeningTable
 from warpflat.garment.construction.edges import (
     ON,
+    above_and_below,
     added,
     changed,
     direction,
     downwards,
     drawn_on,
     edge_at,
+    falling,
     in_sizes,
     lengths_of,
     lines_inside,
     lines_of,
-    neighbour,
     new_piece,
     parted,
     redrawn,
@@ -70,23 +71,35 @@ def mark_openings(pattern: Pattern, openings: Sequence[OpeningTable], placed: Pl
     """
     for number, opening in enumerate(openings):
         parts = {size: row[number] for size, row in placed.items()}
-        for part in parts[pattern.sample]:
-            begin, end = _reach(opening, part)
-            if end > begin:
-                try:
-                    pattern = _with_opening(pattern, opening, part, parts)
-                except InputError as error:
-                    raise InputError(f"openings[{number}]: {error}") from None
+        try:
+            depths = _button_depths(pattern, opening, parts) if opening.kind == "buttons" else {}
+            for part in parts[pattern.sample]:
+                if _is_open(opening, part):
+                    pattern = _with_opening(pattern, opening, part, parts, depths)
+        except InputError as error:
+            raise InputError(f"openings[{number}]: {error}") from None
     return pattern
 
 
-def _with_opening(pattern: Pattern, opening: OpeningTable, part: OpeningPart, parts: _Parts) -> Pattern:
+def _seam_along(pattern: Pattern, part: OpeningPart) -> Seam:
+    """Return the seam that a part of an opening lies in.
+
+    Raises:
+        InputError: the pattern does not have it.
+    """
+    for seam in pattern.seams:
+        if seam.name == part.seam:
+            return seam
+    raise InputError(f"the pattern has no seam {part.seam!r} of its own")
+
+
+def _with_opening(
+    pattern: Pattern, opening: OpeningTable, part: OpeningPart, parts: _Parts, depths: Mapping[str, FloatArray]
+) -> Pattern:
     """Return a pattern with what an opening does to one of its seams, or to the piece across which it lies."""
     if opening.kind == "keyhole":
         return redrawn(pattern, part.piece, lambda piece: _keyhole(piece, opening))
-    seam = next((each for each in pattern.seams if each.name == part.seam), None)
-    if seam is None:
-        raise InputError(f"the pattern has no seam {part.seam!r} of its own")
+    seam = _seam_along(pattern, part)
     if opening.kind == "wrap":
         if seam.openings:
             raise InputError(f"{seam.name!r} has another opening; a wrap is open all along it")
@@ -100,9 +113,9 @@ def _with_opening(pattern: Pattern, opening: OpeningTable, part: OpeningPart, pa
         seam = replace(seam, openings=(*seam.openings, opened))
         pattern = _with_seam(pattern, seam)
     if opening.kind == "zip":
-        return _with_zip(pattern, seam, opening, parts, ends=end < part.whole)
+        return _with_zip(pattern, seam, opening, parts)
     if opening.kind == "buttons":
-        return _with_buttons(pattern, seam, opening, parts)
+        return _with_buttons(pattern, seam, opening, parts, depths)
     if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0:
         raise InputError(f"a {opening.kind} begins at the lower end of a seam between two edges")
     for side in [side for side in seam.stretches if not side.mirrored]:
@@ -126,6 +139,12 @@ def _reach(opening: OpeningTable, part: OpeningPart) -> tuple[float, float]:
     return max(0.0, begin), min(part.whole, end)
 
 
+def _is_open(opening: OpeningTable, part: OpeningPart) -> bool:
+    """Return whether an opening reaches into a seam along its line."""
+    begin, end = _reach(opening, part)
+    return end > begin
+
+
 def _part_of(parts: Sequence[OpeningPart], seam: Seam) -> OpeningPart:
     return next(part for part in parts if part.seam == seam.name)
 
@@ -140,7 +159,7 @@ def _with_seam(pattern: Pattern, seam: Seam) -> Pattern:
     return replace(pattern, seams=[seam if each.name == seam.name else each for each in pattern.seams])
 
 
-def _with_zip(pattern: Pattern, seam: Seam, opening: OpeningTable, parts: _Parts, *, ends: bool) -> Pattern:
+def _with_zip(pattern: Pattern, seam: Seam, opening: OpeningTable, parts: _Parts) -> Pattern:
     """Return a pattern with the line of a zip beside the edges of a seam, and a notch where it ends, if it does within the seam."""
     import shapely
 
@@ -155,7 +174,7 @@ def _with_zip(pattern: Pattern, seam: Seam, opening: OpeningTable, parts: _Parts
                     place - passed[piece.size] for place in _reach(opening, _part_of(parts[piece.size], seam))
                 )
                 line = np.asarray(shapely.LineString(piece.edge(edge).points).offset_curve(_INSIDE).coords)
-                line = line if runs_down(piece, line) else line[::-1]
+                line = falling(piece, line)
                 begin, stop = max(begin, 0.0), min(stop, polyline_length(line))
                 title = f"{opening.style} zip {1e3 * _length(opening, parts[piece.size]):.0f} mm"
                 return drawn_on(piece, [(title, part_between(line, begin, stop))] if stop > begin else [])
@@ -163,7 +182,7 @@ def _with_zip(pattern: Pattern, seam: Seam, opening: OpeningTable, parts: _Parts
             if not side.mirrored:
                 pattern = redrawn(pattern, side.piece, beside_edge)
             passed = {size: past + edge_at(pattern, side, size).length for size, past in passed.items()}
-    if not ends:
+    if seam.openings[-1].whole:
         return pattern
     return with_notches(pattern, seam, {size: [_reach(opening, _part_of(row, seam))[1]] for size, row in parts.items()})
 
@@ -188,32 +207,40 @@ def with_notches(pattern: Pattern, seam: Seam, lengths: Mapping[str, Sequence[fl
     return _with_seam(pattern, replace(seam, notches=by_size[pattern.sample], size_notches=by_size))
 
 
-def _with_buttons(pattern: Pattern, seam: Seam, opening: OpeningTable, parts: _Parts) -> Pattern:
-    """Return a pattern with a button stand on both sides of a seam, which is sewn only below it."""
-    if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0:
-        raise InputError("buttons begin at the upper end of a seam between two edges")
-    places = list(dict.fromkeys(side.place for side in seam.stretches))
-    name, edge = places[0]
+def _button_depths(pattern: Pattern, opening: OpeningTable, parts: _Parts) -> dict[str, FloatArray]:
+    """Return by size how far below the upper end of an opening its buttons lie [m], evenly through all of its seams."""
     depths = dict[str, FloatArray]()
     # The sample size first: the others have as many buttons.
     for size in sorted(pattern.pieces, key=lambda each: each != pattern.sample):
-        bust = bust_depth(pattern.piece(name, size), edge)
-        depths[size] = button_depths(
-            opening, _length(opening, parts[size]), None if bust is None else _part_of(parts[size], seam).before + bust,
-            len(depths[pattern.sample]) if depths else None,
-        )  # fmt: skip
+        busts = list[float]()
+        for part in (part for part in parts[size] if _is_open(opening, part)):
+            name, edge = _seam_along(pattern, part).stretches[0].place
+            bust = bust_depth(pattern.piece(name, size), edge)
+            busts += [] if bust is None else [part.before + bust]
+        count = len(depths[pattern.sample]) if depths else None
+        depths[size] = button_depths(opening, _length(opening, parts[size]), next(iter(busts), None), count)
+    return depths
+
+
+def _with_buttons(
+    pattern: Pattern, seam: Seam, opening: OpeningTable, parts: _Parts, depths: Mapping[str, FloatArray]
+) -> Pattern:
+    """Return a pattern with a button stand on both sides of a seam, which is sewn only below it, if the stand ends within the seam."""
+    if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0:
+        raise InputError("buttons begin at the upper end of a seam between two edges")
 
     def buttoned(piece: Piece, edge: str) -> Piece:
         part = _part_of(parts[piece.size], seam)
         below = depths[piece.size] - part.before
         here = below[(below >= 0.0) & (below < part.whole)]
-        whole = sum(each.whole for each in parts[piece.size])
+        end = _reach(opening, part)[1]
         # All along an edge that is rounded it ends with that.
-        end = np.inf if opening.length >= whole else opening.length - part.before
-        return with_button_stand(piece, edge, opening, end, here)
+        return with_button_stand(piece, edge, opening, end if end < part.whole else np.inf, here)
 
-    still_sewn = opening.length < edge_at(pattern, places[0]).length
-    pattern = replace(pattern, seams=[each for each in pattern.seams if each.name != seam.name or still_sewn])
+    places = dict.fromkeys(side.place for side in seam.stretches)
+    pattern = replace(
+        pattern, seams=[each for each in pattern.seams if each.name != seam.name or not seam.openings[-1].whole]
+    )
     return with_pieces(pattern, [buttoned(piece, edge) for name, edge in places for piece in in_sizes(pattern, name)])
 
 
@@ -225,7 +252,7 @@ def _with_godet(pattern: Pattern, seam: Seam, opening: OpeningTable) -> Pattern:
     first = seam.sides[0][0]
     shell, freed = pattern.piece(first.piece, pattern.sample), f"{first.edge} godet"
     # The edge beyond its lower end is the hem, which runs on along the wedge.
-    hem = shell.edge(neighbour(shell, freed, int(downwards(shell, freed)[1]))[0])
+    hem = shell.edge(above_and_below(shell, freed)[1])
     if (shell.name, hem.name) in sewn_places(pattern):
         raise InputError(f"a godet runs out into a hem; {seam.name!r} ends at {hem.name!r}, which is sewn")
     half = 0.5 * opening.width / opening.length
@@ -276,7 +303,7 @@ def _keyhole(piece: Piece, opening: OpeningTable) -> Piece:
     line = lines_of(piece).get(opening.seam)
     if line is None:
         raise InputError(f"a keyhole is cut along a line inside its piece; {piece.name} has no {opening.seam!r} inside")
-    slit = part_between(line if runs_down(piece, line) else line[::-1], 0.0, opening.length)
+    slit = part_between(falling(piece, line), 0.0, opening.length)
     along = direction(slit)
     across, radius = np.array([along[1], -along[0]]), 0.5 * opening.width
     turn = np.radians(np.linspace(-150.0, 150.0, 33))

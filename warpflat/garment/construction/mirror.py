@@ -12,7 +12,7 @@ from warpflat.core import FloatArray, InputError, IntArray, reflected
 from warpflat.flat import SAME_PLACE, Surface, half_edges, join_labels
 from warpflat.garment.construction.edges import SAME_PIECE
 
-__all__ = ["even_sides", "match_images", "mirror_images", "mirror_partners", "mirror_plane"]
+__all__ = ["even_sides", "image_laid", "match_images", "mirror_images", "mirror_partners", "mirror_plane"]
 
 
 def mirror_partners(faces: IntArray, axis: IntArray, *, vertex_count: int) -> IntArray:
@@ -155,6 +155,17 @@ def match_images(
     return found
 
 
+def image_laid(layout: FloatArray, mate: FloatArray, partners: IntArray) -> FloatArray:
+    """Return the mirror image of another piece's layout, moved onto a layout (#P by 2 [m]), vertex by vertex.
+
+    Args:
+        layout: #P by 2 [m].
+        mate: of its mirror image, whose `partners` (#P) are the vertices' own.
+    """
+    image = mate[partners] * [-1.0, 1.0]
+    return np.asarray(image + layout.mean(axis=0) - image.mean(axis=0))
+
+
 def even_sides(layouts: Mapping[str, FloatArray], images: Mapping[str, tuple[str, IntArray]]) -> dict[str, FloatArray]:
     """Return layouts (#P by 2 [m]) of which each is the mean of itself and of its mirror image's; as they are unless all are nearly that.
 
@@ -162,8 +173,7 @@ def even_sides(layouts: Mapping[str, FloatArray], images: Mapping[str, tuple[str
     """
     made = dict[str, FloatArray]()
     for name, (mate, partners) in images.items():
-        own, other = layouts[name], layouts[mate][partners] * [-1.0, 1.0]
-        other = other + own.mean(axis=0) - other.mean(axis=0)
+        own, other = layouts[name], image_laid(layouts[name], layouts[mate], partners)
         if np.abs(own - other).max() < SAME_PIECE:
             made[name] = 0.5 * (own + other)
     return made if made.keys() == layouts.keys() else dict(layouts)

@@ -14,13 +14,12 @@ from warpflat.core import (
     InputError,
     IntArray,
     arc_lengths,
-    find_unused_name,
     nearest,
     other_side,
     without_side,
 )
 from warpflat.garment.construction.details import OpeningTable
-from warpflat.garment.construction.rings import find_rings, ring_line
+from warpflat.garment.construction.rings import find_rings
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.forms import Form, PieceRecipe
 from warpflat.garment.mannequin.halves import is_side
@@ -164,10 +163,7 @@ def opened_rings(
 
     The way around goes along an opening to its end and back: twice the distance to the nearer end that is closed.
     """
-    rings: dict[str, set[int]] = {}
-    for ring, _ in find_rings(mannequin, form, positions):
-        # Called as they are where they are measured.
-        rings[find_unused_name(ring_line(mannequin, ring), rings)] = set(ring.tolist())
+    rings = {name: set(ring.tolist()) for name, (ring, _) in find_rings(mannequin, form, positions).items()}
     edges = set().union(*rings.values())
     levels = {level: set(mannequin.layout.lines[level].tolist()) for level in RING_LEVELS}
     found: dict[str, float] = {}

@@ -10,7 +10,6 @@ from warpflat.core import FloatArray, InputError, arc_lengths, find_unused_name,
 from warpflat.garment.construction.button_stand import buttonhole
 from warpflat.garment.construction.edges import (
     ON,
-    ON_EDGE,
     Place,
     added,
     direction,
@@ -22,7 +21,7 @@ from warpflat.garment.construction.edges import (
     side_points,
     up_and_across,
 )
-from warpflat.garment.construction.free_edges import Break, free_chain, marks_of, split_edge
+from warpflat.garment.construction.free_edges import Break, crossed_at, split_edge
 from warpflat.garment.construction.strips import folded_strip
 from warpflat.pattern import Pattern, Piece
 
@@ -101,18 +100,16 @@ def with_placket(pattern: Pattern, places: Sequence[Place], length: float, calle
     import shapely
 
     for place in places:
-        name, edge = place
-        chain = free_chain(pattern, [place])
-        at = {size: marks_of(pattern, chain, size, "centre front") for size in pattern.pieces}
-        lengths = {size: edge_at(pattern, place, size).length for size in pattern.pieces}
-        if all(len(row) == 1 and ON_EDGE < row[0] < lengths[size] - ON_EDGE for size, row in at.items()):
+        at = crossed_at(pattern, place, "centre front")
+        if at is not None:
             break
     else:
         raise InputError("a placket lies in the centre front, and no piece of this edge crosses it")
+    name, edge = place
 
     def boxed(piece: Piece) -> Piece:
         # A box around the slit, up to the edge.
-        top, (up, across) = points_at_lengths(piece.edge(edge).points, at[piece.size])[0], up_and_across(piece)
+        top, (up, across) = points_at_lengths(piece.edge(edge).points, at[piece.size]), up_and_across(piece)
         low, half = top - length * up, 0.5 * _STRIP * across
         lines = {
             f"slit {1e3 * length:.0f} mm": np.array([top, low]),
@@ -146,7 +143,7 @@ def with_placket(pattern: Pattern, places: Sequence[Place], length: float, calle
         )  # fmt: skip
 
     pattern = redrawn(pattern, name, boxed_and_filled)
-    pattern, broken = split_edge(pattern, place, {size: row[0] for size, row in at.items()})
+    pattern, broken = split_edge(pattern, place, at)
     return pattern, [broken]
 
 

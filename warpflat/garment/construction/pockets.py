@@ -21,8 +21,8 @@ from warpflat.core import (
 )
 from warpflat.garment.construction.details import PocketTable
 from warpflat.garment.construction.edges import (
+    above_and_below,
     backwards,
-    beside,
     copies_sewn,
     downwards,
     drawn_on,
@@ -33,6 +33,7 @@ from warpflat.garment.construction.edges import (
     new_piece,
     polygon_edges,
     redrawn,
+    runs_down,
     sewn,
     trimmed,
     up_and_across,
@@ -180,10 +181,7 @@ def _with_hip_pocket(pattern: Pattern, pocket: PocketTable) -> Pattern:
     The corner that is cut off belongs to a piece of its own, which is sewn in its place at the upper edge and in the seam. A bag of
     the same outline, without the corner, is sewn to the opening.
     """
-    names = {pocket.seam, other_side(pocket.seam)}
-    opened = [seam for seam in pattern.seams if seam.name in names]
-    if not opened:
-        raise InputError(f"no seam {pocket.seam!r}; {nearest(pocket.seam, [seam.name for seam in pattern.seams])}")
+    opened = _opened_seams(pattern, pocket)
     # Of pieces that are cut in pairs both seams have one edge.
     fronts = dict[tuple[str, str], SeamSide]()
     for seam in opened:
@@ -203,8 +201,7 @@ def _cut_hip_pocket(pattern: Pattern, pocket: PocketTable, front: SeamSide) -> P
     facing, bag = (free_piece_name(pattern, f"{front.piece}_pocket_{what}") for what in ("facing", "bag"))
     opening = find_unused_name("pocket opening", {edge.name for edge in sample.edges})
     # The upper edge comes before the side's where that runs downwards.
-    first = downwards(sample, front.edge)[1]
-    upper = beside(sample, front.edge)[0 if first else 1]
+    first, upper = runs_down(sample, sample.edge(front.edge).points), above_and_below(sample, front.edge)[0]
     names = opening, facing, bag
     pattern = redrawn(
         pattern, front.piece, lambda piece: _hip_pocket(piece, pocket, upper, front.edge, names, first=first)
@@ -312,6 +309,18 @@ def _between_ends(ring: FloatArray, start: FloatArray, end: FloatArray, away: Fl
     return part
 
 
+def _opened_seams(pattern: Pattern, pocket: PocketTable) -> list[Seam]:
+    """Return the seam in which a pocket opens, and that of the other side of the body.
+
+    Raises:
+        InputError: there is none; gives the nearest.
+    """
+    opened = [seam for seam in pattern.seams if seam.name in (pocket.seam, other_side(pocket.seam))]
+    if not opened:
+        raise InputError(f"no seam {pocket.seam!r}; {nearest(pocket.seam, [seam.name for seam in pattern.seams])}")
+    return opened
+
+
 def _check_clear(seam: Seam, begin: float, end: float) -> None:
     """Check that a pocket's opening [m from the upper end of its seam], with what its bag runs past it, is clear of a zip or buttons there.
 
@@ -339,12 +348,9 @@ def _check_end(end: float, called: str, whole: float) -> None:
 
 def _with_bags(pattern: Pattern, pocket: PocketTable) -> Pattern:
     """Return a pattern with the bags of a pocket in a seam, and on the other side's too, and notches where they open."""
-    names = {pocket.seam, other_side(pocket.seam)}
-    opened = [seam for seam in pattern.seams if seam.name in names]
-    if not opened or any(len(row) > 1 for seam in opened for row in seam.sides):
-        raise InputError(
-            f"no seam {pocket.seam!r} between two edges; {nearest(pocket.seam, [seam.name for seam in pattern.seams])}"
-        )
+    opened = _opened_seams(pattern, pocket)
+    if any(len(row) > 1 for seam in opened for row in seam.sides):
+        raise InputError(f"the bag of a pocket lies in a seam between two edges, and {pocket.seam!r} joins more")
     # Of halves, and of pieces that are cut in pairs, one seam is listed for both sides.
     joined = [pattern.piece(side.piece, pattern.sample) for row in opened[0].sides for side in row]
     both = 4 if len(opened) == 2 or any(piece.on_fold or piece.quantity % 2 == 0 for piece in joined) else 2

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from warpflat.garment.mannequin.forms import FormResult
     from warpflat.garment.mannequin.mannequin import Level, Mannequin
 
-__all__ = ["GarmentRing", "find_rings", "measure_rings", "ring_line"]
+__all__ = ["GarmentRing", "find_rings", "measure_rings"]
 
 # What is rounded up to this [mm] is easy to measure off, and needs no more precision.
 _ROUNDED_MM = 5.0
@@ -106,11 +106,7 @@ def measure_rings(
         opened: by ring, what openings add [m].
     """
     opened, levels = opened or {}, mannequin.levels()
-    edges: dict[str, float] = {}
-    for ring, length in find_rings(mannequin, form, positions):
-        name = ring_line(mannequin, ring)
-        # Two edges at one line are told apart: the first is the longer one.
-        edges[find_unused_name(name, edges)] = length
+    edges = {name: length for name, (_, length) in find_rings(mannequin, form, positions).items()}
     # Neck and armholes are passed where they are edges.
     within = {name: girth["pattern_m"] for name, girth in girths.items() if not name.startswith(("neck", "armhole"))}
     lengths = within | edges
@@ -132,8 +128,10 @@ def measure_rings(
 
 def find_rings(
     mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]
-) -> list[tuple[IntArray, float]]:
-    """Return the closed edges of the sewn garment, the longest first: vertices on the mannequin, and length [m].
+) -> dict[str, tuple[IntArray, float]]:
+    """Return the closed edges of the sewn garment by their lines, the longest first: vertices on the mannequin, and length [m].
+
+    Of two at one line the shorter is "NAME 2".
 
     An edge of the mannequin is free where just one piece has it on its border, and once: seams and legs of darts have
     it twice. The mirror images of half pieces count, and the fold does not.
@@ -158,16 +156,15 @@ def find_rings(
         if chain[0] == chain[-1]:
             length = sum(free[min(pair), max(pair)] for pair in itertools.pairwise(chain))
             rings.append((np.array(chain[:-1], dtype=np.int32), length))
-    return sorted(rings, key=lambda ring: -ring[1])
-
-
-def ring_line(mannequin: Mannequin, ring: IntArray) -> str:
-    """Return the closed line of the mannequin that a ring lies on, or the one whose middle is nearest to the ring's."""
+    # Each lies on the closed line of the mannequin whose middle is nearest to its own.
     limbs = (*ARM_LEVELS, *LEG_LINES.values())
     names = ["neck", *RING_LEVELS, *(f"{level} {side}" for level in limbs for side in ("left", "right"))]
-    middle = mannequin.vertices[ring].mean(axis=0)
-    middles = {name: mannequin.line(name)[:-1].mean(axis=0) for name in names}
-    return min(names, key=lambda name: float(np.linalg.norm(middles[name] - middle)))
+    middles = np.array([mannequin.line(name)[:-1].mean(axis=0) for name in names])
+    found = dict[str, tuple[IntArray, float]]()
+    for ring, length in sorted(rings, key=lambda ring: -ring[1]):
+        away = np.linalg.norm(middles - mannequin.vertices[ring].mean(axis=0), axis=1)
+        found[find_unused_name(names[int(away.argmin())], found)] = ring, length
+    return found
 
 
 def _line_of(name: str) -> str:

@@ -18,7 +18,7 @@ from warpflat.garment.construction.constraints import Constraint, KeptGirth
 from warpflat.garment.construction.details import SeamTable
 from warpflat.garment.construction.fullness import FullEdge, give_fullness
 from warpflat.garment.construction.garment import Garment
-from warpflat.garment.construction.mirror import even_sides, mirror_images
+from warpflat.garment.construction.mirror import even_sides, image_laid, mirror_images
 from warpflat.garment.construction.sewing import sew
 from warpflat.garment.construction.sewn import Sewn, Stitching
 from warpflat.garment.construction.straight_band import cut_straight, find_band
@@ -175,14 +175,12 @@ def _sew_evenly(
     images = mirror_images({name: piece.network.surface for name, piece in flat.items()}) if len(flat) > 1 else {}
     if any(piece.grain_angle for piece in flat.values()):
         images = {}
-    for one, (mate, partners) in images.items():
-        first_of_two = list(flat).index(one) < list(flat).index(mate)
-        if first_of_two and len(flat[mate].positions) == len(partners):
-            laid = flat[mate].positions.copy()
-            laid[partners] = flat[one].positions * [-1.0, 1.0]
-            laid += flat[mate].positions.mean(axis=0) - laid.mean(axis=0)
-            if np.abs(laid - flat[mate].positions).max() < _ALIKE:
-                flat[mate] = replace(flat[mate], positions=laid)
+    for name, (mate, partners) in images.items():
+        if list(flat).index(mate) < list(flat).index(name):
+            own = flat[name].positions
+            laid = image_laid(own, flat[mate].positions, partners)
+            if np.abs(laid - own).max() < _ALIKE:
+                flat[name] = replace(flat[name], positions=laid)
     sewn = sew(flat, pairs, constraints=constraints, options=options)
     even = even_sides({name: sewn.pieces[name].positions for name in flat}, images)
     return replace(sewn, pieces={name: replace(sewn.pieces[name], positions=even[name]) for name in flat})

@@ -15,7 +15,9 @@ from warpflat.flat import (
     POSSIBLE,
     RawMesh,
     Surface,
+    area_vectors,
     check_size,
+    flat_areas,
     make_surface,
     overlap_area,
     parts_of_faces,
@@ -24,7 +26,7 @@ from warpflat.flat import (
 )
 from warpflat.garment.construction.file_seams import COUNTED, MOST_ISLANDS, file_seams
 
-__all__ = ["SewnPanel", "mesh_area", "read_sewn_panels", "sewn_panels", "with_cuts"]
+__all__ = ["SewnPanel", "read_sewn_panels", "sewn_panels", "with_cuts"]
 
 # How far the area of the texture may differ from the cloth's, in all and for a panel that counts.
 _TRUE_SIZE = 0.25
@@ -58,20 +60,12 @@ class SewnPanel:
     @property
     def area(self) -> float:
         """The area of the cloth as it was cut [m2]."""
-        return mesh_area(self.cut, self.surface)
+        return float(flat_areas(self.cut, triangulate(self.surface.faces)[0]).sum())
 
     @property
     def worn_area(self) -> float:
         """Its area as it is worn [m2]."""
-        return mesh_area(self.surface.vertices, self.surface)
-
-
-def mesh_area(points: FloatArray, surface: Surface) -> float:
-    """Return the area of a surface's faces [m2], whichever way they turn, where its vertices are at these points (#V by 2 or 3 [m])."""
-    a, b, c = np.moveaxis(points[triangulate(surface.faces)[0]], 1, 0)
-    one, other = b - a, c - a
-    square = (one * one).sum(axis=1) * (other * other).sum(axis=1) - (one * other).sum(axis=1) ** 2
-    return float(0.5 * np.sqrt(np.maximum(square, 0.0)).sum())
+        return float(flat_areas(self.surface.vertices, triangulate(self.surface.faces)[0]).sum())
 
 
 def read_sewn_panels(
@@ -179,9 +173,8 @@ def sewn_panels(raw: RawMesh, scale: float, *, name: str = "panel") -> list[Sewn
     panels = list[SewnPanel]()
     for panel in found:
         cut = metres * panel.cut
-        a, b, c = np.moveaxis(cut[triangulate(panel.surface.faces)[0]], 1, 0)
-        turned = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-        panels.append(replace(panel, cut=cut * [-1.0, 1.0] if turned.sum() < 0.0 else cut, unit=unit))
+        facing = area_vectors(cut, triangulate(panel.surface.faces)[0])[:, 2].sum()
+        panels.append(replace(panel, cut=cut * [-1.0, 1.0] if facing < 0.0 else cut, unit=unit))
     for panel in panels:
         # Islands may lie over each other, as layers that are stacked in the plane do.
         own = overlap_area(panel.surface, panel.cut, np.empty(0, dtype=np.int32)) / panel.area

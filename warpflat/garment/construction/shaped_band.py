@@ -123,7 +123,7 @@ def with_shaped_waistband(
         cut |= {(name, before): (title, False), (name, after): (title, True)}
         parts |= {(name, each): SeamSide(piece=title, edge=each) for each in (before, after)}
         upper, lower = SeamSide(piece=title, edge=INNER, reversed=True), SeamSide(piece=name, edge=f"{edge} seam")
-        pattern = sewn(pattern, title.replace("_", " "), lower, upper, notches=centre_notch(whole))
+        pattern = sewn(pattern, title, lower, upper, notches=centre_notch(whole))
     pattern = sewn_alike(pattern, shell, parts, gaps, "the waistband")
     moved = [_with_moved_notches(shell, seam, cut, dict.fromkeys(cut, width)) for seam in shell.seams]
     return replace(pattern, seams=[*moved, *pattern.seams[len(moved) :]])

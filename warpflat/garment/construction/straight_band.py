@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from warpflat.core import IntArray, arc_lengths, polyline_length
+from warpflat.core import IntArray, arc_lengths, polyline_length, resample
 from warpflat.flat import (
     NARROW_BAND,
     Flattening,
@@ -74,12 +74,10 @@ def find_band(piece: Flattening) -> Band | None:
     width = 0.5 * (half - np.sqrt(inside)) if inside > 0.0 else half
     if half - width < NARROW_BAND * width:
         return None
-    around = np.vstack([piece.positions[loop], piece.positions[loop[:1]]])
-    ways = []
-    for beside in (-_BESIDE_CORNER * width, _BESIDE_CORNER * width):
-        at = (arc[:-1] + beside) % arc[-1]
-        ways.append(np.column_stack([np.interp(at, arc, around[:, k]) for k in (0, 1)]) - around[:-1])
-    back, ahead = -ways[0], ways[1]
+    here = piece.positions[loop]
+    shares, aside = arc[:-1] / arc[-1], _BESIDE_CORNER * width / arc[-1]
+    back = here - resample(here, shares - aside, closed=True)
+    ahead = resample(here, shares + aside, closed=True) - here
     turn = np.abs(np.arctan2(back[:, 0] * ahead[:, 1] - back[:, 1] * ahead[:, 0], np.einsum("va,va->v", back, ahead)))
     corners: list[int] = []
     for vertex in np.argsort(-turn, kind="stable").tolist():
@@ -99,12 +97,8 @@ def find_band(piece: Flattening) -> Band | None:
     if max(lengths[first] / lengths[first + 2], lengths[first + 2] / lengths[first]) > 1.0 + _STRETCHED:
         return None
     sides = runs[first], runs[first + 2][::-1]
-    shares = np.linspace(0.0, 1.0, _PLACES)
-    placed = []
-    for side in sides:
-        along = arc_lengths(worn[side])
-        placed.append(np.column_stack([np.interp(shares * along[-1], along, worn[side, k]) for k in range(3)]))
-    across = np.linalg.norm(placed[1] - placed[0], axis=1)
+    one, other = (resample(worn[side], np.linspace(0.0, 1.0, _PLACES)) for side in sides)
+    across = np.linalg.norm(other - one, axis=1)
     if np.ptp(across) > _EVEN * across.mean():
         return None
     area = float(flat_areas(worn, triangles).sum())

@@ -46,10 +46,16 @@ class RowEdges:
             columns: edges of the row.
         """
         found = np.zeros(columns)
-        for name, ends in self.ends.items():
-            lengths = np.linalg.norm(positions[name][ends[:, 0]] - positions[name][ends[:, 1]], axis=1)
+        for name, lengths in self.lengths_of_pieces(positions).items():
             np.add.at(found, self.column[name], lengths * self.shares[name])
         return found
+
+    def lengths_of_pieces(self, positions: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """Return by piece, #E, how long its edges are where its vertices lie so (#V by 2 [m])."""
+        return {
+            name: np.linalg.norm(positions[name][ends[:, 0]] - positions[name][ends[:, 1]], axis=1)
+            for name, ends in self.ends.items()
+        }
 
 
 class PieceEdges:

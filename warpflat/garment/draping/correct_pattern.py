@@ -47,7 +47,7 @@ from warpflat.garment.draping.moved_pattern import (
 from warpflat.garment.draping.relax_drape import relax_drape
 from warpflat.garment.draping.result import Drape
 from warpflat.garment.draping.sewn_cloth import SewnCloth, pieces_of
-from warpflat.pattern import Pattern, outline_edges
+from warpflat.pattern import Pattern
 
 __all__ = ["Correction", "Round", "correct_pattern", "relieve_pattern"]
 
@@ -106,7 +106,7 @@ class Correction:
         found = {}
         for name, piece in pieces_of(garment).items():
             begin = old.piece_vertices[name].start
-            on_outline = set(np.unique(outline_edges(piece.faces)).tolist())
+            on_outline = set(np.unique(border_edges(piece.faces)).tolist())
             for edge, ids in piece.network.surface.lines.items():
                 if len(ids) < 2 or not on_outline.issuperset(ids.tolist()):
                     continue

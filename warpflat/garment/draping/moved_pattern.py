@@ -8,11 +8,11 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 
 from warpflat.core import FloatArray, IntArray, reflected, turned_left, unit
-from warpflat.flat import Flattening, SpringNetwork, corner_triangles, signed_cell_areas
+from warpflat.flat import Flattening, SpringNetwork, border_edges, corner_triangles, signed_cell_areas
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.draping.lift import Lift, surface_lift
 from warpflat.garment.draping.sewn_cloth import SewnCloth, pieces_of
-from warpflat.pattern import MIRRORED, Pattern, Piece, outline_edges
+from warpflat.pattern import MIRRORED, Pattern, Piece
 
 __all__ = [
     "cell_matrix",
@@ -33,11 +33,12 @@ _SEAM, _HOLD = 1e3, 1e-8
 
 def seam_edges(cloth: SewnCloth) -> IntArray:
     """Return the edges of the outlines that are sewn together, #S by 2 edges by 2 vertices of `flat` in corresponding order."""
-    edges = outline_edges(cloth.flat_faces)
+    edges = np.sort(border_edges(cloth.flat_faces), axis=1)
     sewn = cloth.welded[edges]
     turned = sewn[:, 0] > sewn[:, 1]
     edges[turned], sewn[turned] = edges[turned][:, ::-1], sewn[turned][:, ::-1]
-    order = np.lexsort((sewn[:, 1], sewn[:, 0]))
+    # Of the two edges of a seam that with the lower vertices comes first.
+    order = np.lexsort((*np.sort(edges, axis=1).T[::-1], sewn[:, 1], sewn[:, 0]))
     same = (sewn[order][1:] == sewn[order][:-1]).all(axis=1) & (sewn[order][1:, 0] != sewn[order][1:, 1])
     first = np.flatnonzero(same)
     return np.stack([edges[order[first]], edges[order[first + 1]]], axis=1)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core import FloatArray
-from warpflat.flat import corner_means
+from warpflat.flat import border_edges, corner_means
 from warpflat.garment.draping.frames import choose_frames, gap_scale
 from warpflat.garment.draping.result import Drape
 from warpflat.pattern import (
@@ -28,7 +28,6 @@ from warpflat.pattern import (
     View,
     drawn_page,
     dress,
-    outline_edges,
     write_maps,
     write_moving_picture,
 )
@@ -142,7 +141,7 @@ def write_correction_picture(path: str | os.PathLike[str], correction: Correctio
         InputError: the file cannot be written.
     """
     old, new, moved = correction.before.cloth, correction.after.cloth, correction.moved()
-    edges = outline_edges(old.flat_faces)
+    edges = border_edges(old.flat_faces)
     shift, x = np.zeros_like(old.flat), 0.0
     for rows in old.piece_vertices.values():
         low, high = old.flat[rows].min(axis=0), old.flat[rows].max(axis=0)

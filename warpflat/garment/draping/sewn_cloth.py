@@ -10,10 +10,18 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from warpflat.core import FloatArray, InputError, IntArray, range_offsets
-from warpflat.flat import Fabric, Flattening, Surface, corner_triangles, grain_axes, join_labels, mesh_edges
+from warpflat.flat import (
+    Fabric,
+    Flattening,
+    Surface,
+    border_edges,
+    corner_triangles,
+    grain_axes,
+    join_labels,
+    mesh_edges,
+)
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.garment import Garment
-from warpflat.pattern import outline_edges
 
 __all__ = ["ClothPiece", "SewnCloth", "join_pieces", "piece_slices", "pieces_of", "sew_cloth", "worn_surface"]
 
@@ -92,7 +100,7 @@ class SewnCloth:
         values = -of_cell[:, None, None] * (gradient @ gradient.transpose(0, 2, 1))
         matrix = csr_array(coo_array((values.ravel(), places), shape=(count, count)))
         area, inside = self.vertex_areas(), np.ones(count)
-        inside[outline_edges(self.faces).ravel()] = 0.0
+        inside[border_edges(self.faces).ravel()] = 0.0
         near = csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
         takers = near @ inside
         stands_for = area + near @ (np.where(inside == 0.0, area, 0.0) / np.maximum(takers, 1.0))

@@ -59,7 +59,7 @@ def find_seams(pieces: Mapping[str, FormPiece]) -> tuple[FormSeam, ...]:
     """
     found: dict[tuple[str, str, str, str], list[SeamRun]] = {}
     for names, run in _runs(pieces):
-        whole = [pieces[name].parts.get(edge, edge) for name, edge in zip(names, run.edges, strict=True)]
+        whole = [pieces[name].whole(edge) for name, edge in zip(names, run.edges, strict=True)]
         found.setdefault((names[0], names[1], whole[0], whole[1]), []).append(run)
     rows = [(sides, tuple(chain)) for sides, runs in found.items() for chain in _chains(pieces[sides[0]], runs)]
     called = name_seams(
@@ -98,7 +98,7 @@ def _runs(pieces: Mapping[str, FormPiece]) -> list[tuple[tuple[str, str], SeamRu
     """Return the stretches along which one edge is sewn to one edge, with the names of the two pieces."""
     places: dict[tuple[int, int], list[_Place]] = {}
     for name, piece in pieces.items():
-        legs = {leg for dart in piece.darts.values() for leg in dart}
+        legs = piece.leg_edges
         for edge, ids in piece.edges.items():
             if edge in legs:
                 continue

@@ -157,6 +157,11 @@ class FormResult:
         """Return the legs of every dart that the pieces have, by piece and dart; half pieces have those on the left."""
         return {(name, dart): legs for name, piece in self.pieces.items() for dart, legs in piece.legs().items()}
 
+    def seam_of_edges(self) -> dict[tuple[str, str], str]:
+        """Return the seams of the edges that are sewn, by piece and edge."""
+        runs = [(seam, run.edges) for seam in self.seams for run in seam.runs]
+        return {place: seam.name for seam, edges in runs for place in zip(seam.pieces, edges, strict=True)}
+
     def usual_darts(self) -> tuple[FormDart, ...]:
         """Return every dart that a book knows in the pieces, once a side: those of the block, and from the shoulders."""
         found = list(standard_darts(self.layout, self.bricks))

@@ -59,6 +59,15 @@ class FormPiece:
     fisheyes: Mapping[str, tuple[IntArray, IntArray]] = field(default_factory=dict)
     parts: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def leg_edges(self) -> frozenset[str]:
+        """Names of the edges along the legs of its darts."""
+        return frozenset(leg for legs in self.darts.values() for leg in legs)
+
+    def whole(self, edge: str) -> str:
+        """Return what an edge is called without the darts that interrupt it."""
+        return self.parts.get(edge, edge)
+
     def legs(self) -> dict[str, tuple[IntArray, IntArray]]:
         """Return by dart the vertices along its left and right leg, from the border to the tip; of a fish-eye dart from tip to tip."""
         darts = {dart: (self.edges[left], self.edges[right][::-1]) for dart, (left, right) in self.darts.items()}

@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
 
 from warpflat.core import AXES, FloatArray, points_at_lengths, polyline_length, reflected, unit
 from warpflat.flat import components
@@ -75,8 +76,8 @@ _HEADS, _HANDS, _FLAT_HAND = (0.38, 0.75), (0.1, 0.45), 0.65
 _ENOUGH_ABOVE = 0.2
 #: A border is a ring if its area vector is at least this of a circle's; an opening in front is none.
 RING = 0.6
-# Cloth that goes on from all its
-# hems as a tube widened by more than this is a ball's with holes (a top's hem or sleeve .9 to 1.12, a ball's from 1.2 on).
+# Cloth that goes on from all its hems as a tube widened by more than this is a ball's with holes (a top's hem or sleeve .9 to 1.12, a
+# ball's from 1.2 on).
 _TUBE = 1.16
 # It is turned around if it can be worn better by this.
 _SURELY = 0.25
@@ -84,6 +85,8 @@ _SURELY = 0.25
 END = 0.15
 # A plane of symmetry holds if the mirror image of the cloth lies on the cloth within this (median).
 _SYMMETRIC = 0.02
+# Rounds of closest points for the plane of symmetry that is taken.
+_MORE_ROUNDS = 40
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -144,7 +147,7 @@ class Anatomy:
 
     Attributes:
         kind: of garment.
-        up, front, left: directions in space.
+        up, front: directions in space.
         normal, offset: the plane of symmetry, normal . x = offset; the normal points to the left.
         asymmetry: median distance of the mirrored cloth from the cloth [m].
         symmetric: whether it is its own mirror image in that plane.
@@ -159,7 +162,6 @@ class Anatomy:
     kind: Kind
     up: FloatArray
     front: FloatArray
-    left: FloatArray
     normal: FloatArray
     offset: float
     asymmetry: float
@@ -190,6 +192,11 @@ class Anatomy:
     def border(self, role: str) -> Border | None:
         """Return the longest border of a role, if there is one."""
         return next((border for border in self.borders if border.role == role), None)
+
+    @property
+    def neck(self) -> Border | None:
+        """The border around the neck: of what is open in front the opening; None for what hangs from the waist."""
+        return self.border("neck") or self.border("opening")
 
 
 def find_anatomy(cloth: Cloth, *, up: str | None = None, front: str | None = None) -> Anatomy:
@@ -241,7 +248,7 @@ def _wearable(cloth: Cloth, anatomy: Anatomy) -> float:
     if anatomy.kind == "trousers":
         return 0.0
     if anatomy.kind == "jumpsuit":
-        neck = anatomy.border("neck") or anatomy.border("opening")
+        neck = anatomy.neck
         return 2.0 * float(heights[neck.vertices].max() - low) / tall - 1.0 if neck is not None else -1.0
     above, below = end("waist" if anatomy.kind == "skirt" else "neck", True), end("hem", False)
     if not above or not below:
@@ -310,7 +317,7 @@ def _worn(cloth: Cloth, raw: Sequence[Border], upward: FloatArray, front: str | 
         turned_words = _faces_backwards(cloth, borders, kind, upward, forward, open_front)
         if turned_words:
             notes.append(turned_words)
-            forward, left, normal, offset = -forward, -left, -normal, -offset
+            forward, normal, offset = -forward, -normal, -offset
             borders = [replace(border, side=-border.side) for border in borders]
             limbs = [replace(limb, side=-limb.side) for limb in limbs]
     if one_sleeve:
@@ -323,7 +330,6 @@ def _worn(cloth: Cloth, raw: Sequence[Border], upward: FloatArray, front: str | 
         kind=kind,
         up=upward,
         front=forward,
-        left=left,
         normal=normal,
         offset=offset,
         asymmetry=asymmetry,
@@ -386,10 +392,6 @@ def _above_slanted_hem(cloth: Cloth, upward: FloatArray, loops: Sequence[Border]
     return above if slants else cloth.mass
 
 
-# Rounds of closest points for the plane of symmetry that is taken.
-_MORE_ROUNDS = 40
-
-
 def _plane_of_symmetry(
     vertices: FloatArray, mass: FloatArray, upward: FloatArray, size: float
 ) -> tuple[FloatArray, float, float]:
@@ -397,8 +399,6 @@ def _plane_of_symmetry(
 
     Closest points again and again, from twelve upright planes through the middle.
     """
-    from scipy.spatial import cKDTree
-
     tree = cKDTree(vertices)
     share = mass / mass.sum()
     # Quadrature points of equal area, and so independent of how fine the mesh is where.

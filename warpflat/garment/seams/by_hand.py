@@ -12,13 +12,22 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 
 from warpflat.core import FloatArray, InputError, arc_lengths, points_at_lengths, project_on_segments, quote_value, unit
-from warpflat.flat import Surface, SurfacePath, are_joined, geodesic_path, locate, plane_sections, polyline_path
+from warpflat.flat import (
+    SAME_PLACE,
+    Surface,
+    SurfacePath,
+    are_joined,
+    geodesic_path,
+    locate,
+    plane_sections,
+    polyline_path,
+)
 from warpflat.garment.seams.anatomy import FROM_SHOULDERS, TAILORED, Anatomy
-from warpflat.garment.seams.cloth import LEVELS, Cloth, are_among, edge_components, section
+from warpflat.garment.seams.cloth import ISLAND, LEVELS, Cloth, are_among, edge_components, section
 from warpflat.garment.seams.options import SeamCut, SeamOptions, in_family
-from warpflat.garment.seams.symmetric import SAME_PLACE
 from warpflat.garment.seams.tailor import BESIDE, LEFT, centre_lines
 
 __all__ = ["HAND", "cut_by_hand", "join_ends", "keep_seams", "leave_to_hand", "level_of", "plane_curves"]
@@ -29,14 +38,10 @@ Ids = NDArray[np.int64]
 HAND = "by hand: "
 
 # Lengths are shares of the garment's size, the square root of its area.
-# A place further off the cloth is a mistake.
-_FAR = 0.1
 # An end of a drawn seam so near to a border or another seam is carried on to it; one so little beyond another seam is left out.
 _REACH = 0.015
 # A seam that was found is left to a drawn one if this share of it runs beside that one.
 _MOSTLY = 0.6
-# A curve in which a plane meets the cloth is a wrinkle below this share of the longest one.
-_WRINKLE = 0.05
 # Steps of a polyline over the cloth, in lengths of its edges.
 _STEP = 3.0
 # A yoke lies so far down from the shoulder to the armpit, or from the waist to the crotch.
@@ -110,7 +115,7 @@ def plane_curves(
             f"lies at {origin @ axis:.4g} m"
         )
     longest = max(path.length for _, path in found)
-    found = [(layer, path) for layer, path in found if path.length >= _WRINKLE * longest]
+    found = [(layer, path) for layer, path in found if path.length >= ISLAND * longest]
     if not nearest:
         return found
     return [min(found, key=lambda one: float(np.linalg.norm(one[1].points - origin, axis=1).min()))]
@@ -153,7 +158,7 @@ def _paths(
     layer = owners[0] if owners else int(off.sum(axis=1).argmin())
     surface = whole[layer]
     for point, away in zip(given, off[layer], strict=True):
-        if away > _FAR * cloths[layer].size:
+        if away > BESIDE * cloths[layer].size:
             x, y, z = point.tolist()
             raise InputError(f"the point ({x:g}, {y:g}, {z:g}) lies {away:.3g} m off the garment; points are in metres")
     if cut.points:
@@ -192,8 +197,6 @@ def _owners(surfaces: Sequence[Surface], rows: Sequence[Ids]) -> tuple[list[int]
     Raises:
         InputError: there is no such vertex, or it lies on none of the layers.
     """
-    from scipy.spatial import cKDTree
-
     wanted, of_row = np.unique(np.concatenate(rows), return_inverse=True)
     count = max(len(surface.input_vertices) for surface in surfaces)
     if wanted[-1] >= count:
@@ -207,9 +210,8 @@ def _owners(surfaces: Sequence[Surface], rows: Sequence[Ids]) -> tuple[list[int]
         lost = np.flatnonzero(place < 0)
         if len(lost):
             # It was joined to another one at its place.
-            diagonal = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
             away, near = cKDTree(surface.vertices).query(surface.input_vertices[wanted[lost]])
-            place[lost] = np.where(away <= SAME_PLACE * diagonal, near, -1)
+            place[lost] = np.where(away <= SAME_PLACE, near, -1)
         places.append(place)
     layers, found = list[int](), list[Ids]()
     for number in np.split(of_row.ravel(), np.cumsum([len(row) for row in rows])[:-1]):
@@ -277,8 +279,6 @@ def join_ends(cloth: Cloth) -> tuple[Cloth, list[str]]:
 
 def leave_to_hand(cloth: Cloth, options: SeamOptions) -> tuple[Cloth, list[str]]:
     """Return the cloth without seams that were found where the user has drawn one, and notes: of the same name, or close beside it."""
-    from scipy.spatial import cKDTree
-
     drawn = {name: edges for name, edges in cloth.seams.items() if name.startswith(HAND)}
     if not drawn:
         return cloth, []
@@ -370,18 +370,16 @@ def _kept(cloth: Cloth, anatomy: Anatomy, name: str, options: SeamOptions) -> Cl
 
 def level_of(cloth: Cloth, anatomy: Anatomy, name: str, options: SeamOptions) -> float | None:
     """Return the height of a waist or a yoke [m]; None where the garment has none."""
+    if anatomy.kind not in (TAILORED if name == "yoke" else FROM_SHOULDERS):
+        return None
     trunk = cloth.labels["sleeve"] < 0
     heights = cloth.vertices @ anatomy.up
     own = heights[np.unique(cloth.faces[trunk])]
     forks = {kind: [float(limb.fork @ anatomy.up) for limb in anatomy.limbs_of(kind)] for kind in ("sleeve", "leg")}
     low, high = float(own.min()), float(own.max())
     if name == "yoke":
-        if anatomy.kind not in TAILORED:
-            return None
         bottom = max(forks["sleeve"] or forks["leg"] or [0.5 * (low + high)])
         return high - _YOKE * (high - bottom)
-    if anatomy.kind not in FROM_SHOULDERS:
-        return None
     waist = options.waist_along(anatomy.up)
     if waist is not None and low < waist < high:
         return waist

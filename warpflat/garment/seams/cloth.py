@@ -47,7 +47,7 @@ SAME_WAY, FACES = 0.97, 0.5
 BESIDE_LINE = 0.05
 #: Girths, and how far cloth reaches, are measured at so many heights.
 LEVELS = 32
-#: An island of the other sign of less than this share of its part is a wrinkle.
+#: An island of the other sign of less than this share of its part is a wrinkle, and so is such a curve beside the longest one of a plane.
 ISLAND = 0.06
 
 
@@ -109,6 +109,10 @@ class Cloth(TriangleMesh):
         """Return the cloth with other labels; one that is None is left out."""
         every = {**self.labels, **labels}
         return replace(self, labels={name: label for name, label in every.items() if label is not None})
+
+    def marked(self, faces: Ids) -> BoolArray:
+        """Return #F, whether a face is among those of some numbers."""
+        return np.isin(np.arange(len(self.faces)), faces)
 
     def only(self, faces: BoolArray) -> Cloth:
         """Return some of the faces (#F) alone, with the vertices that they use, and what of the seams runs along them."""
@@ -181,11 +185,10 @@ class Cloth(TriangleMesh):
         crossing = within[:, None] & (f[sides[:, :, 0]] * f[sides[:, :, 1]] < 0.0)
         key = sides[:, :, 0] * count + sides[:, :, 1]
         known = np.unique(key[crossing])
-        new = np.searchsorted(known, key)
-        hit = (new < len(known)) & (known[np.minimum(new, max(len(known) - 1, 0))] == key) if len(known) else crossing
-        middle = np.where(hit, count + new, -1)
+        hit = np.isin(key, known)
+        middle = np.where(hit, count + np.searchsorted(known, key), -1)
         a, b = known // count, known % count
-        t = np.clip(f[a] / (f[a] - f[b]), _CLEAR, 1.0 - _CLEAR)[:, None] if len(known) else np.empty((0, 1))
+        t = np.clip(f[a] / (f[a] - f[b]), _CLEAR, 1.0 - _CLEAR)[:, None]
         values = {
             name: np.concatenate([value, (1.0 - t[:, 0]) * value[a] + t[:, 0] * value[b]])
             for name, value in cloth.values.items()
@@ -221,14 +224,9 @@ class Cloth(TriangleMesh):
         parent, split = parent[order], np.concatenate(parts)[order]
         seams = {}
         for name, edges in cloth.seams.items():
-            place = np.searchsorted(known, edges[:, 0] * count + edges[:, 1])
-            cut = (
-                (place < len(known))
-                & (known[np.minimum(place, max(len(known) - 1, 0))] == edges[:, 0] * count + edges[:, 1])
-                if len(known)
-                else np.zeros(len(edges), bool)
-            )
-            m = count + place[cut]
+            key = edges[:, 0] * count + edges[:, 1]
+            cut = np.isin(key, known)
+            m = count + np.searchsorted(known, key[cut])
             halves = [np.stack([edges[cut, 0], m], axis=1), np.stack([edges[cut, 1], m], axis=1)]
             seams[name] = np.concatenate([edges[~cut], *halves])
         made = Cloth(

@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 
 from warpflat.core import (
     BoolArray,
-    FloatArray,
     InputError,
     find_unused_name,
     other_side,
     report_activity,
     two_at_a_time,
 )
-from warpflat.flat import LEAST_MOUTH, TRIED, Fabric, Flattening, Surface, components
+from warpflat.flat import LEAST_MOUTH, TRIED, Fabric, Flattening, Surface
 from warpflat.garment.seams.anatomy import Anatomy
 from warpflat.garment.seams.cloth import ALIKE, Cloth, PieceMesh, edge_components
 from warpflat.garment.seams.lines import APART, WAIST, WIDE, Line, Offer, first_of_equals, offers
@@ -334,11 +333,11 @@ def _can_be_sewn(cloth: Cloth, line: Line, before: Sequence[Measured], after: Se
         return least_width(after, size) >= least_width(before, size)
     # A flap that hangs by what is hardly sewn counts while it is small, too.
     for necks in ((NARROW * size,), (SEWABLE, 0.005)):
-        parts = (
+        was, now = (
             max(parts_within(one.surface.faces, one.result.positions, *necks) for one in some)
             for some in (before, after)
         )
-        if next(parts) < next(parts):
+        if now > was:
             return False
     beside = np.unique(cloth.seams[_TRIAL])
     widest = 0.0
@@ -382,7 +381,7 @@ def _cut(cloth: Cloth, mesh: PieceMesh, line: Line, name: str) -> Cloth | None:
 
     A dart begins at the border of the piece and ends inside; a seam parts the piece in two.
     """
-    own = np.isin(np.arange(len(cloth.faces)), mesh.face_of)
+    own = cloth.marked(mesh.face_of)
     field = line.field(cloth)
     cloth = cloth.with_values(trial=field)
     if line.start is not None and line.end is not None:
@@ -391,7 +390,12 @@ def _cut(cloth: Cloth, mesh: PieceMesh, line: Line, name: str) -> Cloth | None:
         beside = np.linalg.norm(cloth.vertices - line.start - np.clip(along, 0.0, 1.0)[:, None] * way, axis=1)
         # Cloth that lies elsewhere in the same plane, such as the other side of a tube, is not meant.
         near = beside < 0.5 * float(np.linalg.norm(way))
-        reached = _reached_within(cloth, own & near[cloth.faces].any(axis=1), line.start)
+        near = own & near[cloth.faces].any(axis=1)
+        if not near.any():
+            return None
+        part = cloth.only(near).parts
+        first = np.linalg.norm(cloth.vertices[cloth.faces[near]].mean(axis=1) - line.start, axis=1).argmin()
+        reached = cloth.marked(np.flatnonzero(near)[part == part[first]])
         # The tip lies where it is meant to, not where the next edge is: on both sides of a garment alike.
         corners = field[cloth.faces]
         through = reached & (corners.min(axis=1) < 0.0) & (corners.max(axis=1) > 0.0)
@@ -410,16 +414,3 @@ def _cut(cloth: Cloth, mesh: PieceMesh, line: Line, name: str) -> Cloth | None:
     if (counts > 2).any() or len(at_border) != 2 or np.isin(vertices[counts == 2], border).any():
         return None
     return made.with_seam(name, longest) if at_border.sum() == (2 if line.parts else 1) else None
-
-
-def _reached_within(cloth: Cloth, allowed: BoolArray, start: FloatArray) -> BoolArray:
-    """Return #F, the allowed faces that hang together with the one nearest to a place."""
-    chosen = np.flatnonzero(allowed)
-    found = np.zeros(len(cloth.faces), dtype=bool)
-    if len(chosen) == 0:
-        return found
-    part = components(cloth.faces[chosen].astype(np.int32), barrier=cloth.seam_edges().astype(np.int32))
-    middle = cloth.vertices[cloth.faces[chosen]].mean(axis=1)
-    first = int(np.linalg.norm(middle - start, axis=1).argmin())
-    found[chosen[part == part[first]]] = True
-    return found

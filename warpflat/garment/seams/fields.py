@@ -10,6 +10,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, csr_array, diags_array
+from scipy.spatial import cKDTree
 
 from warpflat.core import BoolArray, FloatArray, factor_symmetric, reflected, unit
 from warpflat.flat import (
@@ -101,7 +102,7 @@ class TriangleMesh:
 
     @cached_property
     def curvature(self) -> FloatArray:
-        """#V, by how much the angles of the faces around a vertex fall short of 2 pi, of pi at the border [rad]."""
+        """#V, by how much the angles of the faces around a vertex fall short of 2 pi [rad]."""
         return np.array(trimesh.Trimesh(self.vertices, self.faces, process=False).vertex_defects)
 
     @cached_property
@@ -203,12 +204,10 @@ class MirrorMap:
 
     Attributes:
         matrix: #V by #V; times a field it gives the field's value at each vertex's mirror image.
-        distance: #V, from the mirror image of a vertex to the surface [m].
         weight: #V, 1 where the surface has a mirror image, falling to 0 where it has none.
     """
 
     matrix: csr_array
-    distance: FloatArray
     weight: FloatArray
 
     def symmetrised(self, values: FloatArray, sign: float = 1.0) -> FloatArray:
@@ -224,8 +223,6 @@ def mirror_map(mesh: TriangleMesh, normal: FloatArray, offset: float, *, reach: 
         normal: of length 1, offset: [m].
         reach: a vertex whose image is so far from the surface has no mirror image [m].
     """
-    from scipy.spatial import cKDTree
-
     vertices, faces = mesh.vertices, mesh.faces
     corners = vertices[faces]
     image = reflected(vertices, normal, offset)
@@ -243,4 +240,4 @@ def mirror_map(mesh: TriangleMesh, normal: FloatArray, offset: float, *, reach: 
         shares[better] = share[better]
     rows = np.repeat(np.arange(len(vertices)), 3)
     matrix = coo_array((shares.ravel(), (rows, faces[chosen].ravel())), shape=(len(vertices), len(vertices))).tocsr()
-    return MirrorMap(matrix=csr_array(matrix), distance=best, weight=np.clip(2.0 - 2.0 * best / reach, 0.0, 1.0))
+    return MirrorMap(matrix=csr_array(matrix), weight=np.clip(2.0 - 2.0 * best / reach, 0.0, 1.0))

@@ -24,9 +24,9 @@ from warpflat.flat import (
     Fabric,
     Flattening,
     Surface,
-    area_vectors,
     as_fabric,
     border_loops,
+    flat_areas,
     line_from_curve,
     line_on_plane,
     load_library,
@@ -106,8 +106,7 @@ class FoundSeams:
 
     def beyond_limit(self, fabric: Fabric) -> float:
         """Return the share of the cloth that is beyond its limit where the pieces are laid flat, about."""
-        vectors = [area_vectors(piece.vertices, triangulate(piece.faces)[0]) for piece in self.pieces]
-        area = [float(np.linalg.norm(each, axis=1).sum()) for each in vectors]
+        area = [float(flat_areas(piece.vertices, piece.faces[:, :3]).sum()) for piece in self.pieces]
         return float(np.average([laid_flat(piece, fabric, 0.0).outside for piece in self.pieces], weights=area))
 
     def knit_for(self, fabric: Fabric) -> str:
@@ -427,14 +426,13 @@ def _surface_of(cloth: Cloth, anatomy: Anatomy, mesh: PieceMesh, whole: Surface,
 def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[str]:
     """Return names of pieces: "left_sleeve", "front", "right_back_leg"; a number behind those that occur twice."""
     area = cloth.face_areas
-    plain, bands = [], [_band(cloth, mesh) for mesh in meshes]
+    plain, bands = list[str](), [_band(cloth, mesh) for mesh in meshes]
     sleeves = [cloth.sleeve_of(mesh) for mesh in meshes]
     # A short sleeve from the armhole on is no cuff.
     bands = [
         "" if band == "cuff" and sleeves.count(sleeve) == 1 and sleeve >= 0 else band
         for band, sleeve in zip(bands, sleeves, strict=True)
     ]
-    both_sides = Counter[str]()
     for mesh, band, sleeve in zip(meshes, bands, sleeves, strict=True):
         weight = area[mesh.face_of]
         corners = cloth.faces[mesh.face_of]
@@ -467,12 +465,11 @@ def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[
             part = side_word(side) if lopsided else "front" if ahead > 0.0 else "back"
             name = f"{part}_{band}" if bands.count(band) > 1 else band
         plain.append(name)
-        both_sides[name] += 1
-    seen = Counter[str]()
+    often, seen = Counter(plain), Counter[str]()
     names = []
     for name in plain:
         seen[name] += 1
-        names.append(f"{name}_{seen[name]}" if both_sides[name] > 1 else name)
+        names.append(f"{name}_{seen[name]}" if often[name] > 1 else name)
     return names
 
 
@@ -498,7 +495,7 @@ def _alike(pieces: Sequence[Surface]) -> list[str]:
     measures = []
     for piece in pieces:
         length = sum(polyline_length(piece.vertices[loop], closed=True) for loop in border_loops(piece.faces))
-        area = np.linalg.norm(area_vectors(piece.vertices, piece.faces[:, :3]), axis=1).sum()
+        area = flat_areas(piece.vertices, piece.faces[:, :3]).sum()
         axes = np.linalg.eigh(np.cov((piece.vertices - piece.vertices.mean(axis=0)).T))[1]
         measures.append([np.sqrt(area), length, *np.ptp(piece.vertices @ axes, axis=0)])
     left = list(range(len(pieces)))

@@ -28,6 +28,7 @@ from warpflat.flat import (
     Layer,
     RawMesh,
     Surface,
+    border_of,
     check_size,
     corner_means,
     euler_characteristic,
@@ -252,8 +253,6 @@ def read_garment(
 
 def _is_body(surface: Surface, others: Sequence[Surface]) -> bool:
     """Return whether a layer is the body that wears the others: closed, without handles, as tall as one, and most of them lie on it."""
-    from scipy.spatial import cKDTree
-
     if np.ptp(surface.vertices, axis=0).max() < _SHORTEST_BODY or not _is_closed(surface):
         return False
     worn = [other.vertices for other in others if not _is_closed(other)]
@@ -264,6 +263,4 @@ def _is_body(surface: Surface, others: Sequence[Surface]) -> bool:
 
 
 def _is_closed(surface: Surface) -> bool:
-    from warpflat.flat import border_of
-
     return len(border_of(surface)) == 0

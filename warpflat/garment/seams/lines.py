@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from warpflat.core import FloatArray, reflected, unit
 from warpflat.flat import LEAST_MOUTH, TRIED, LaidCloth, border_loops, components
-from warpflat.garment.seams.anatomy import END, FROM_SHOULDERS, Anatomy, has_role
+from warpflat.garment.seams.anatomy import END, Anatomy, has_role
 from warpflat.garment.seams.by_hand import level_of
 from warpflat.garment.seams.cloth import ALIKE, Cloth
 from warpflat.garment.seams.fields import TriangleMesh
@@ -179,15 +179,13 @@ def _darts(
     hangs |= low & has_role(cloth, own[loop], "opening")
     starts = loop[~hangs & (np.bincount(own)[own[loop]] == 1)]
     inner = np.flatnonzero(~laid.border)
-    facing = piece.mesh.area_vectors
-    across = anatomy.across(surface.vertices)
-    middle = APART * size
-    whole = anatomy.mirror is not None and not twice and across.min() < -middle and across.max() > middle
+    across, near = anatomy.across(surface.vertices), APART * size
+    whole = anatomy.mirror is not None and not twice and across.min() < -near and across.max() > near
     away = np.linalg.norm(flat[loop][:, None] - flat[inner], axis=2).min(axis=0)
-    deep = inner[away >= APART * size]
+    deep = inner[away >= near]
     ends = list[tuple[int, int]]()
     for place in places:
-        if whole and across[place] < -middle:
+        if whole and across[place] < -near:
             continue
         if place in deep:
             ends += [(mouth, place) for mouth in laid.mouths(place) if mouth in starts]
@@ -197,20 +195,20 @@ def _darts(
             inwards = unit(flat[laid.nearest(deep, flat[mouth])] - flat[mouth])
             ends += [(mouth, laid.nearest(deep, flat[mouth] + reach * size * inwards)) for reach in _REACHES]
     for mouth, tip in dict.fromkeys(ends):
-        if not APART * size < float(np.linalg.norm(flat[tip] - flat[mouth])) < _LONGEST * size:
+        if not near < float(np.linalg.norm(flat[tip] - flat[mouth])) < _LONGEST * size:
             continue
         start, end = surface.vertices[[mouth, tip]]
-        normal = np.cross(end - start, facing[(surface.faces[:, :3] == tip).any(axis=1)].mean(axis=0))
+        normal = np.cross(end - start, piece.mesh.vertex_normals[tip])
         if not normal.any():
             continue
         line = Line(name="dart", normal=normal / np.linalg.norm(normal), point=start, start=start, end=end)
         pairs = [(mouth, tip)]
-        if whole and np.abs(across[[mouth, tip]]).max() > middle:
-            if np.abs(across[[mouth, tip]]).min() < middle or across[mouth] * across[tip] < 0.0:
+        if whole and np.abs(across[[mouth, tip]]).max() > near:
+            if np.abs(across[[mouth, tip]]).min() < near or across[mouth] * across[tip] < 0.0:
                 continue
-            near = ((loop, anatomy.image(start)), (inner, anatomy.image(end)))
-            away_from = [np.linalg.norm(surface.vertices[among] - image, axis=1) for among, image in near]
-            pairs.append((int(loop[away_from[0].argmin()]), int(inner[away_from[1].argmin()])))
+            ends_there = ((loop, anatomy.image(start)), (inner, anatomy.image(end)))
+            there = [np.linalg.norm(surface.vertices[among] - image, axis=1).argmin() for among, image in ends_there]
+            pairs.append((int(loop[there[0]]), int(inner[there[1]])))
         rows = [row for pair in pairs if (row := laid.dart(*pair)) is not None]
         if len(rows) == len(pairs) and _are_apart(rows):
             yield line, rows
@@ -309,7 +307,7 @@ def _tailored(
             yield Line(name=name, normal=anatomy.normal, point=anatomy.offset * anatomy.normal)
         tall = float(np.ptp(heights))
         name, level, waist = "yoke", float(heights[places[0]]), None
-        if anatomy.kind in FROM_SHOULDERS and (tall > 0.8 * size or options.waist is not None):
+        if tall > 0.8 * size or options.waist is not None:
             # Where the body has it, or the trunk is narrowest.
             waist = level_of(cloth, anatomy, WAIST, options)
         if waist is not None and 0.2 * tall < waist - heights.min() < 0.8 * tall:

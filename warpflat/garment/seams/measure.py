@@ -70,12 +70,12 @@ def remembered(cloth: Cloth, pieces: Sequence[Measured]) -> Cloth:
     owner = np.full(len(cloth.faces), -1, dtype=np.int64)
     for number, piece in enumerate(pieces):
         owner[piece.mesh.face_of] = number
-    return replace(cloth, labels={**cloth.labels, _FACE: np.arange(len(owner)), OWNER: owner})
+    return cloth.with_labels(**{_FACE: np.arange(len(owner)), OWNER: owner})
 
 
 def without_memory(cloth: Cloth) -> Cloth:
     """Return the cloth without these labels."""
-    return replace(cloth, labels={key: label for key, label in cloth.labels.items() if key not in (_FACE, OWNER)})
+    return cloth.with_labels(**{_FACE: None, OWNER: None})
 
 
 def _corners_laid(piece: Measured, anatomy: Anatomy) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +53,7 @@ def _opened(cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy, options: SeamOption
     before, used = _tubes(mesh), np.unique(mesh.vertex_of)
     limbs = [limb for limb in anatomy.limbs if np.isin(anatomy.borders[limb.border].vertices, used).all()]
     for name, level, cost in _lines(cloth, anatomy, [limb.kind for limb in limbs]):
-        own = np.isin(np.arange(len(cloth.faces)), mesh.face_of)
-        made, _, own, lines = cloth.parted(level, own)
+        made, _, own, lines = cloth.parted(level, cloth.marked(mesh.face_of))
         parts = edge_components(made.new_edges(lines), ends=np.union1d(made.border_edges, made.seam_edges()))
         chosen = [(cost(made, part), part) for part in parts]
         for value, part in sorted(chosen, key=lambda one: one[0]):
@@ -78,17 +78,14 @@ def _lines(cloth: Cloth, anatomy: Anatomy, limbs: list[str]) -> Iterator[tuple[s
     def beside(cloth: Cloth, edges: Ids) -> float:
         return float(np.abs(anatomy.across(cloth.vertices[np.unique(edges)])).mean())
 
-    def behind(cloth: Cloth, edges: Ids) -> float:
-        facing = float(cloth.values[FACING][np.unique(edges)].mean())
+    def behind(cloth: Cloth, edges: Ids, sign: float = 1.0) -> float:
+        facing = sign * float(cloth.values[FACING][np.unique(edges)].mean())
         return facing if facing < 0.0 else np.inf
-
-    def ahead(cloth: Cloth, edges: Ids) -> float:
-        return behind(cloth.with_values(**{FACING: -cloth.values[FACING]}), edges)
 
     if limbs == ["sleeve"]:
         yield "underarm", FACING, height
     if "leg" in limbs:
         yield "inseam", FACING, beside
     yield "centre back", LEFT, behind
-    yield "centre front", LEFT, ahead
+    yield "centre front", LEFT, partial(behind, sign=-1.0)
     yield "side", FACING, lambda cloth, edges: -beside(cloth, edges)

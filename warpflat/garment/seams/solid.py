@@ -17,8 +17,8 @@ other. So a toy falls into halves and gussets.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 
 from warpflat.core import FloatArray, IntArray, polyline_length, unit
-from warpflat.flat import Surface, border_loops, euler_characteristic, inner_borders, triangulate
+from warpflat.flat import Surface, border_loops, inner_borders, triangulate
 from warpflat.garment.seams.anatomy import HOLE, Anatomy
 from warpflat.garment.seams.cloth import ALIKE, SAME_WAY, Cloth, PieceMesh, section
 from warpflat.garment.seams.fields import TriangleMesh
@@ -112,15 +112,6 @@ class LaidFlat:
 LayFlat = Callable[[Cloth, PieceMesh, float], LaidFlat]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Way:
-    """A way of cutting a part: a field, positive on one side; `round` if the part is round about an axis, and can fall into equal ones."""
-
-    field: FloatArray
-    name: str
-    round: bool
-
-
 def is_open(mesh: PieceMesh) -> bool:
     """Return whether a piece is a disk, or a tube that one cut opens."""
     return mesh.shape in ((1, 1), (2, 0))
@@ -150,7 +141,7 @@ def is_whole_garment(surface: Surface) -> bool:
         return False
     cloth = Cloth(vertices=surface.vertices, faces=triangulate(surface.faces)[0].astype(np.int64))
     wide = _wide_borders(cloth)
-    handles = (2 - len(border_loops(surface.faces, surface.vertices)) - euler_characteristic(surface.faces)) // 2
+    handles = (2 - sum(cloth.shape)) // 2
     if len(wide) == 2:
         # Between a flat ring and a tube, which is cut open, lies what neither is nor becomes flat, such as a poncho.
         lack = 1.0 + inner_borders(surface)[0][1] / (2.0 * np.pi)
@@ -286,7 +277,7 @@ def _around_handles(mesh: PieceMesh) -> Ids:
 
 def _cut(cloth: Cloth, mesh: PieceMesh, field: FloatArray, name: str, mirror: Anatomy | None) -> Cloth | None:
     """Return the cloth with a piece, and its mirror image, cut along a field's zero line (#V of the piece); None if it is not parted."""
-    own, way = np.isin(np.arange(len(cloth.faces)), mesh.face_of), np.zeros(len(cloth.vertices))
+    own, way = cloth.marked(mesh.face_of), np.zeros(len(cloth.vertices))
     way[mesh.vertex_of] = field
     keep = 0.01
     for other in cloth.pieces() if mirror is not None else ():
@@ -377,9 +368,10 @@ def _smoothed_normals(mesh: TriangleMesh) -> FloatArray:
     return unit(mesh.smooth(mesh.vertex_normals, _SMOOTH * mesh.size))
 
 
-def _ways(mesh: PieceMesh, mirror: Anatomy | None) -> Iterator[_Way]:
-    """Yield ways of cutting a part: across each of its axes through the middle, and where it begins to face each way along them.
+def _ways(mesh: PieceMesh, mirror: Anatomy | None) -> tuple[list[FloatArray], bool]:
+    """Return ways of cutting a part: across each of its axes through the middle, and where it begins to face each way along them.
 
+    Each is a field (#V), positive on one side. With them comes whether the part is round about an axis, and can fall into equal ones.
     With `mirror` it is its own mirror image: an axis that nearly is across the plane of symmetry is taken as that, and cut in the plane.
     """
     middles = mesh.vertices[mesh.faces].mean(axis=1)
@@ -413,14 +405,13 @@ def _ways(mesh: PieceMesh, mirror: Anatomy | None) -> Iterator[_Way]:
             axes[k], fields[:, k] = mirror.normal, mesh.vertices @ mirror.normal - mirror.offset
     # To the nanometre: on which side a vertex in the plane of symmetry lies is not for rounding to say.
     fields = np.round(fields, 9)
-    for k in (1, 2, 0):
-        yield _Way(field=fields[:, k], name="across", round=bool(same.any()))
+    ways = [fields[:, k] for k in (1, 2, 0)]
     normals = _smoothed_normals(mesh)[mesh.faces].mean(axis=1)
     for axis in axes:
         weight = np.repeat(mesh.face_areas * (normals @ axis) / 3.0, 3)
         facing = np.bincount(mesh.faces.ravel(), weight, minlength=len(mesh.vertices)) / mesh.mass
-        for sign in (1.0, -1.0):
-            yield _Way(field=sign * facing - _BASE, name="base", round=bool(same.any()))
+        ways += [facing - _BASE, -facing - _BASE]
+    return ways, bool(same.any())
 
 
 def _key(mesh: PieceMesh, area: float) -> tuple[int, float]:
@@ -452,17 +443,19 @@ def _best_way(
     """Return the field (#V) along whose zero line a part is cut so that the least is left to do; None if no cut parts it well."""
     image = None if mirror is None else mirror_image(mesh, mesh, mirror)
     found = list[tuple[float, Cloth, FloatArray]]()
-    for way in _ways(mesh, None if image is None else mirror) if neck is None else [_across_neck(mesh, neck)]:
+    ways, is_round = _ways(mesh, None if image is None else mirror)
+    for field in ways if neck is None else [_across_neck(mesh, neck)]:
+        way = field
         if image is not None:
-            other = way.field[image]
-            alike = abs(float(way.field @ other)) > SAME_WAY * float(np.linalg.norm(way.field) * np.linalg.norm(other))
+            other = field[image]
+            alike = abs(float(field @ other)) > SAME_WAY * float(np.linalg.norm(field) * np.linalg.norm(other))
             if neck is None and not alike:
                 continue
             if not alike:
                 # At both of its necks.
-                way = replace(way, field=np.maximum(way.field, other))
+                way = np.maximum(field, other)
         local = Cloth(vertices=mesh.vertices, faces=mesh.faces)
-        made, _, _, edges = local.parted(way.field, np.ones(len(local.faces), dtype=bool), keep=0.05)
+        made, _, _, edges = local.parted(way, np.ones(len(local.faces), dtype=bool), keep=0.05)
         if len(edges) == 0:
             continue
         made = made.with_seam("way", edges)
@@ -471,9 +464,9 @@ def _best_way(
         if len(parts) == 1 or min(areas) < 0.3 * _LEAST * total:
             continue
         cost = _SEAM * made.seam_length("way") / np.sqrt(sum(areas)) + sum(_topology(part) for part in parts)
-        cost += _SEAM * way.round * (max(areas) > (1.0 + ALIKE) * min(areas))
+        cost += _SEAM * (neck is None and is_round) * (max(areas) > (1.0 + ALIKE) * min(areas))
         cost += sum(_strain(part, known) * area for part, area in zip(parts, areas, strict=True)) / sum(areas)
-        found.append((cost, made, way.field))
+        found.append((cost, made, way))
     best: tuple[float, FloatArray] | None = None
     for cost, made, field in sorted(found, key=lambda one: one[0]):
         if best is not None and best[0] <= cost:
@@ -488,8 +481,8 @@ def _best_way(
     return None if best is None else best[1]
 
 
-def _across_neck(mesh: PieceMesh, neck: FloatArray) -> _Way:
-    """Return the way of cutting a part at its neck and nowhere else, in the plane through its ends that is at right angles to the cloth."""
+def _across_neck(mesh: PieceMesh, neck: FloatArray) -> FloatArray:
+    """Return the field (#V) that cuts a part at its neck and nowhere else: in the plane through its ends at right angles to the cloth."""
     middle, points, normals = neck.mean(axis=0), mesh.vertices, mesh.area_vectors
     away = np.linalg.norm(points[mesh.faces].mean(axis=1) - middle, axis=1)
     near = away < max(np.linalg.norm(neck[1] - neck[0]), 2e-3)
@@ -500,7 +493,7 @@ def _across_neck(mesh: PieceMesh, neck: FloatArray) -> _Way:
     if len(ahead):
         first = ahead[np.linalg.norm(points[ahead] - middle, axis=1).argmin()]
         field = np.where(mesh.reached(field > 0.0, np.array([first])), field, -np.abs(field))
-    return _Way(field=field, name="neck", round=False)
+    return field
 
 
 def parts_within(faces: IntArray, flat: FloatArray, width: float, tip: float = _LEAST) -> int:

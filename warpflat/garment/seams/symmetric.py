@@ -9,16 +9,16 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from warpflat.core import FloatArray, other_side, project_on_segments
+from warpflat.flat import SAME_PLACE
 from warpflat.garment.seams.anatomy import Anatomy
 from warpflat.garment.seams.cloth import ALIKE, BESIDE_LINE, FACES, LEVELS, Cloth, PieceMesh, are_among, edge_components
+from warpflat.garment.seams.tailor import LEFT
 
-__all__ = ["SAME_PLACE", "averaged", "mirror_image", "mirrored"]
+__all__ = ["averaged", "mirror_image", "mirrored"]
 
 Ids = NDArray[np.int64]
 
 # Lengths are shares of the garment's size, the square root of its area.
-#: Vertices are at one place within this.
-SAME_PLACE = 1e-5
 # Cloth is averaged if its mirror image lies as near as this at all but a hundredth of its vertices: half of this it moves.
 _FARTHEST = 0.035
 # A seam that keeps so near to the plane of symmetry is in it.
@@ -32,7 +32,7 @@ _TOLD = 5e-4
 def mirror_image(mesh: PieceMesh, other: PieceMesh, anatomy: Anatomy) -> Ids | None:
     """Return for each vertex of a piece the one of another piece that is its mirror image; None where the other is not its mirror image."""
     away, nearest = cKDTree(other.vertices).query(anatomy.image(mesh.vertices))
-    return nearest if float(away.max()) < SAME_PLACE * anatomy.size else None
+    return nearest if float(away.max()) < SAME_PLACE else None
 
 
 def averaged(cloth: Cloth, anatomy: Anatomy) -> tuple[Cloth, str, bool]:
@@ -113,7 +113,7 @@ def mirrored(cloth: Cloth, anatomy: Anatomy) -> tuple[Cloth, str]:
             if len(rows):
                 seams[title] = np.unique(np.concatenate([seams[title], rows]) if title in seams else rows, axis=0)
     values = {
-        name: np.concatenate([value, (-1.0 if name == "left" else 1.0) * value[off]])
+        name: np.concatenate([value, (-1.0 if name == LEFT else 1.0) * value[off]])
         for name, value in half.values.items()
         if name != "across"
     }

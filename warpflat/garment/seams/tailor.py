@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from warpflat.core import BoolArray, FloatArray, reflected, unit
 from warpflat.flat import border_loops, components
-from warpflat.garment.seams.anatomy import FROM_SHOULDERS, Anatomy, Limb
-from warpflat.garment.seams.cloth import FACES, ISLAND, LEVELS, Cloth, edge_components, section
+from warpflat.garment.seams.anatomy import Anatomy, Limb
+from warpflat.garment.seams.cloth import FACES, ISLAND, LEVELS, SAME_WAY, Cloth, edge_components, section
 
 __all__ = [
     "BESIDE",
@@ -36,10 +36,10 @@ _STEP = 0.008
 _STEEP = 3.0
 # Nor does its plane follow an arm further than this: one that hangs, and one that is raised.
 _HANGS, _RAISED = np.radians(-4.0), np.radians(30.0)
-# A hood is wider, across its opening, than the neck below it by this, and the shoulders are by more. Its
-# opening goes up by at least this share of its height.
-_WIDER, _ROOT, _SHOULDERS, _FACE = 1.1, 1.35, 1.5, 0.5
-#: A line that the user has drawn is meant where a tailor would have cut within this.
+# A hood is wider, across its opening, than the neck below it by this, and the shoulders are by the second. Its opening goes up by at
+# least this share of its height.
+_WIDER, _SHOULDERS, _FACE = 1.1, 1.4, 0.5
+#: A line that the user has drawn is meant where a tailor would have cut within this; what is drawn further off the cloth is a mistake.
 BESIDE = 0.08
 # A sleeve has no more than this share of the neck, or of the opening.
 _NECK = 0.35
@@ -143,7 +143,7 @@ def _armhole_fields(cloth: Cloth, anatomy: Anatomy) -> dict[int, FloatArray]:
             image = reflected(other, normal)
             shift = there - 2.0 * anatomy.offset * float(other @ normal)
             rim = anatomy.borders[limb.border].middle
-            if abs((rim @ one - at) - (rim @ image - shift)) < 0.08 * size and one @ image > np.cos(np.radians(25.0)):
+            if abs((rim @ one - at) - (rim @ image - shift)) < BESIDE * size and one @ image > SAME_WAY:
                 length = float(np.linalg.norm(one + image))
                 both, level = (one + image) / length, (at + shift) / length
                 found[number] = both, level
@@ -171,7 +171,8 @@ def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> 
     rim = anatomy.borders[limb.border].vertices
     others = [b for k, b in enumerate(anatomy.borders) if k != limb.border]
     step = _STEP * anatomy.size
-    lengths, middles, offsets = list[float](), list[FloatArray](), list[float]()
+    # Sections that run around the sleeve alone, from the innermost on: their offsets, lengths and middles.
+    around = list[tuple[float, float, FloatArray]]()
     bare: tuple[float, FloatArray] | None = None
     for number in range(60):
         offset = (number + 0.5) * step
@@ -183,18 +184,15 @@ def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> 
         if bare is None and beyond[rim].all() and crossed == {"neck"} and max(shares) <= _NECK:
             bare = offset, section(cloth, height - offset, np.asarray(beyond[cloth.faces].any(axis=1)))[1]
         if not beyond[rim].all() or crossed:
-            lengths, middles, offsets = [], [], []
+            around = []
             continue
         if bare is not None:
             # A neck that leaves the shoulders bare ends on the sleeves, and so does the armhole.
             return bare
-        length, middle = section(cloth, height - offset, np.asarray(beyond[cloth.faces].any(axis=1)))
-        lengths.append(length)
-        middles.append(middle)
-        offsets.append(offset)
-        if len(lengths) > 3 and all(lengths[-4 + k] - lengths[-2 + k] < _STEEP * 2.0 * step for k in (0, 1)):
-            return offsets[-4], middles[-4]
-    return (offsets[0], middles[0]) if offsets else bare
+        around.append((offset, *section(cloth, height - offset, np.asarray(beyond[cloth.faces].any(axis=1)))))
+        if len(around) > 3 and all(around[k][1] - around[k + 2][1] < _STEEP * 2.0 * step for k in (-4, -3)):
+            return around[-4][::2]
+    return around[0][::2] if around else bare
 
 
 def _sleeves(cloth: Cloth, anatomy: Anatomy) -> Iterator[tuple[int, str, Limb]]:
@@ -227,7 +225,8 @@ def cut_as_a_tailor(cloth: Cloth, anatomy: Anatomy, *, hood: bool = True) -> tup
         else:
             cloth = cut
     cloth = _cut_hood(cloth, anatomy) if hood else cloth
-    if anatomy.kind in ("trousers", "jumpsuit"):
+    legs = anatomy.limbs_of("leg")
+    if legs:
         cloth, centre = centre_lines(cloth)
         for name, edges in centre.items():
             if len(edges):
@@ -240,17 +239,15 @@ def cut_as_a_tailor(cloth: Cloth, anatomy: Anatomy, *, hood: bool = True) -> tup
     # Above the middle of the armholes a line is a shoulder where there are no sleeves.
     bare = [float(border.middle @ anatomy.up) for border in anatomy.borders if border.role == "sleeve"]
     upper = float(np.mean(bare)) if bare else np.inf
-    crotch = next((limb.fork for limb in anatomy.limbs_of("leg")), None)
     lines = cloth.line_between(ahead, trunk)
     on_left = cloth.values[LEFT][lines].mean(axis=1) > 0.0
     ends: list[tuple[str, Ids]] = []
     for leftwards in (True, False):
         parts = edge_components(lines[on_left == leftwards])
-        near = (
-            [float(np.linalg.norm(cloth.vertices[part.ravel()] - crotch, axis=1).min()) for part in parts]
-            if crotch is not None
-            else []
-        )
+        # The one that is the nearest to the crotch is the inseam.
+        near = [
+            np.linalg.norm(cloth.vertices[part.ravel()] - leg.fork, axis=1).min() for leg in legs[:1] for part in parts
+        ]
         for k, part in enumerate(parts):
             heights = cloth.vertices[part.ravel()] @ anatomy.up
             if near and k == int(np.argmin(near)) and len(parts) > 1:
@@ -335,8 +332,8 @@ def _cut_hood(cloth: Cloth, anatomy: Anatomy) -> Cloth:
     A hood widens above the neck, and its opening, or the front's, goes up along the face. Its line lies in a plane from there to the
     nape. Its faces have the label "sleeve" behind the last sleeve: lines of the trunk do not run in it.
     """
-    opening = anatomy.border("neck") or anatomy.border("opening")
-    if opening is None or anatomy.kind not in FROM_SHOULDERS:
+    opening = anatomy.neck
+    if opening is None:
         return cloth
     trunk = cloth.labels["sleeve"] < 0
     heights, ahead = cloth.vertices @ anatomy.up, cloth.vertices @ anatomy.front
@@ -359,7 +356,7 @@ def _cut_hood(cloth: Cloth, anatomy: Anatomy) -> Cloth:
     is_neck = (above > _WIDER * girths) & (below > _SHOULDERS * girths)
     neck = int(np.where(is_neck, girths, np.inf).argmin())
     # Its seam lies at the neck's root, where the shoulders begin.
-    level = float(levels[1 + max(np.flatnonzero(girths[:neck] > _ROOT * girths[neck]), default=-1)])
+    level = float(levels[1 + max(np.flatnonzero(girths[:neck] > _SHOULDERS * girths[neck]), default=-1)])
     rim = heights[opening.vertices]
     if not is_neck[neck] or rim.max() - level < _FACE * (top - level):
         return cloth

@@ -86,7 +86,7 @@ def _turned(cloth: Cloth, border: Border, size: float) -> BoolArray | None:
     reached = np.zeros(len(cloth.vertices), dtype=bool)
     reached[loop] = True
     taken = np.zeros(len(cloth.faces), dtype=bool)
-    turned, last, width = False, np.zeros(len(cloth.faces), dtype=bool), 0.0
+    turned, width = False, 0.0
     rim: BoolArray | None = None
     ring = cloth.vertices[loop].mean(axis=0)
     for _ in range(40):
@@ -102,12 +102,11 @@ def _turned(cloth: Cloth, border: Border, size: float) -> BoolArray | None:
         across = abs(float(((normals[layer] @ axis) * weight).sum())) / max(float(weight.sum()), 1e-300)
         lies_across = _INSIDE <= facing < _OUTSIDE and across > _SQUARE
         if not turned and lies_across and weight.sum() < _RIM * size * border.length:
-            rim = layer.copy()
+            rim = layer
         elif facing >= _OUTSIDE or (not turned and facing >= _INSIDE):
             break
         turned |= facing < _INSIDE
         taken |= layer
-        last = taken.copy()
         width += float(weight.sum()) / max(border.length, 1e-300)
         if width > _WIDEST * size:
             return None
@@ -117,4 +116,4 @@ def _turned(cloth: Cloth, border: Border, size: float) -> BoolArray | None:
             return None
         reached[new] = True
         ring = cloth.vertices[new].mean(axis=0)
-    return last if turned else None
+    return taken if turned else None

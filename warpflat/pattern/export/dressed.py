@@ -9,7 +9,6 @@ import numpy as np
 from warpflat.core import FloatArray, IntArray
 from warpflat.flat import border_edges, join_labels, triangulate
 from warpflat.pattern.export.colours import SKIN
-from warpflat.pattern.export.geometry import outline_edges
 from warpflat.pattern.export.views import Facets
 
 __all__ = ["Body", "crop_body", "dress"]
@@ -48,7 +47,7 @@ def dress(
     """
     near, skin = crop_body(body, worn if room is None else room)
     all_faces = np.concatenate([faces, np.column_stack([near + len(worn), np.full(len(near), -1)])])
-    facets = Facets.of(all_faces.astype(np.int32), outline_edges(faces))
+    facets = Facets.of(all_faces.astype(np.int32), border_edges(faces))
     return np.concatenate([worn, skin]), facets, np.tile(SKIN, (len(near), 1))
 
 

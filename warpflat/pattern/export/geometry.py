@@ -1,4 +1,4 @@
-"""Geometry that exporters need of a mesh: areas, outline edges, lines. Every division is guarded."""
+"""Geometry that exporters need of a mesh: areas and lines."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 
 from warpflat.core import FloatArray, IntArray
-from warpflat.flat import flat_areas, half_edges, triangulate
+from warpflat.flat import flat_areas, triangulate
 
 __all__ = [
     "Polylines",
     "face_areas",
-    "outline_edges",
     "polylines_of",
 ]
 
@@ -35,9 +34,3 @@ def face_areas(positions: FloatArray, faces: IntArray) -> FloatArray:
     triangles, face = triangulate(faces)
     areas = flat_areas(positions, triangles)
     return np.bincount(face, weights=areas, minlength=len(faces)).astype(np.float64)
-
-
-def outline_edges(faces: IntArray) -> IntArray:
-    """Return the edges with one face only (#B by 2), as (lower, higher) vertex: border, holes, sides of cracks."""
-    sides = half_edges(faces)
-    return sides.edges[sides.count == 1]

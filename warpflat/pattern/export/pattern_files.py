@@ -25,6 +25,7 @@ from warpflat.core import (
     plain_letters,
     record_file,
     report_activity,
+    same_file,
     write_json,
     write_report,
 )
@@ -447,7 +448,7 @@ def _marker(
     cloths = list(
         dict.fromkeys(each for row in drafted.pieces.values() for piece in row for each in piece.piece.cloths)
     )
-    names, remarks, plans = list[str](), list[str](), list[dict[str, Any]]()
+    names, remarks, plans, stems = list[str](), list[str](), list[dict[str, Any]](), list[str]()
     for number, fabric in enumerate(cloths):
         own = cloth if number == 0 else replace(cloth, stripes=Stripes())
         of = "" if number == 0 else f" of {fabric}"
@@ -456,8 +457,11 @@ def _marker(
         if not_made:
             plans.append({"not_made": _reason(not_made[0])})
             continue
-        # The shell's marker has no more than the garment's name.
-        stem = name if number == 0 else f"{name}.{plain_letters(fabric).replace(' ', '_')}"
+        # The shell's marker has no more than the garment's name; two cloths may be called alike in letters that a file can have.
+        stem = make_file_name(name if number == 0 else f"{name}.{plain_letters(fabric).replace(' ', '_')}")
+        alike = sum(same_file(stem) == same_file(other) for other in stems)
+        stems.append(stem)
+        stem += f"_{alike + 1}" if alike else ""
         files = [file_in(folder, stem, ending) for ending in _MARKER]
         write_marker_svg(marker, files[0])
         placements: list[dict[str, Any]] = [

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core import BoolArray, FloatArray, IntArray, unit
-from warpflat.flat import Surface, area_vectors, mean_normals, mesh_edges, triangulate
+from warpflat.flat import Surface, area_vectors, border_edges, mean_normals, mesh_edges, triangulate
 from warpflat.pattern.export.colours import Scale
 from warpflat.pattern.export.figure import GREY, INK, PAGE_WIDTH, Pen, Pixels, drawn_page
-from warpflat.pattern.export.geometry import outline_edges
 from warpflat.pattern.export.raster import Samples, rasterise, shade
 
 __all__ = [
@@ -70,7 +69,7 @@ class Facets:
         has_face[triangles] = True
         used = np.flatnonzero(has_face)
         drawn = faces if outline is None else faces[:0]
-        outline = outline_edges(faces) if outline is None else outline
+        outline = border_edges(faces) if outline is None else outline
         return cls(faces=drawn, triangles=triangles, face_of_triangle=face, outline=outline, used=used)
 
 
