@@ -109,6 +109,7 @@ from .surface.connectivity import border_of as border_of
 from .surface.connectivity import chain_lines as chain_lines
 from .surface.connectivity import components as components
 from .surface.connectivity import euler_characteristic as euler_characteristic
+from .surface.connectivity import fan_labels as fan_labels
 from .surface.connectivity import join_labels as join_labels
 from .surface.connectivity import orient as orient
 from .surface.cut.crack import Crack as Crack
@@ -126,6 +127,7 @@ from .surface.half_edges import border_edges as border_edges
 from .surface.half_edges import half_edges as half_edges
 from .surface.half_edges import half_edges_of as half_edges_of
 from .surface.half_edges import mesh_edges as mesh_edges
+from .surface.half_edges import paired_half_edges as paired_half_edges
 from .surface.injective import is_injective as is_injective
 from .surface.injective import overlap_area as overlap_area
 from .surface.io.raw_mesh import ALL_PRIMS as ALL_PRIMS

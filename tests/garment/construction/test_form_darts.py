@@ -15,9 +15,11 @@ from warpflat.flat.surface.overlap import OVERLAP
 from warpflat.garment.construction.darts import closed_darts
 from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.to_pattern import pattern_of_garment
+from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.darts import FormDart
 from warpflat.garment.mannequin.ease import ease_from
 from warpflat.garment.mannequin.forms import form_from_mapping, shipped_form
+from warpflat.garment.mannequin.part_pieces import part_pieces, princess_seams
 from warpflat.garment.mannequin.shapes import shaped_form
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.half_pieces import halved
@@ -231,6 +233,12 @@ def test_princess_seams_part_the_pieces(body):
         f"{face}_{part}" for face in ("front", "back") for part in ("centre", "side_left", "side_right")
     ]
     assert "princess front left" in {seam.name for seam in form.seams}
+    # So are those of one side of the body.
+    half = form_from_mapping("vest", {"pieces": {"front_left": {"bricks": ["shoulder-waist/front-left-*"]}}})
+    bricks = select_bricks(body.layout, half.pieces["front_left"].bricks)
+    parted = part_pieces(body.layout, body.vertices, half, princess_seams(body.layout, bricks, "front_left"))
+    datums = {name: piece.datum for name, piece in parted.pieces.items()}
+    assert datums == {"front_left_centre": "princess front left", "front_left_side_left": "princess front left"}
     own = form_from_mapping(
         "sleeve", {"pieces": {"arm": {"bricks": ["armhole-biceps/arm-left-*"], "open": ["underarm left"]}}}
     )

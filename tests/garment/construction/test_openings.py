@@ -91,6 +91,17 @@ def test_a_zip_in_one_side_leaves_left_and_right_one_pattern(mannequin: Mannequi
     assert {p.quantity for p in slit.pieces[""]} == {1}
 
 
+def test_a_half_is_open_where_its_piece_was_on_its_side(mannequin: Mannequin):
+    sides = ("side left", "side right")
+    poncho = Form(name="poncho", pieces={"cloth": PieceRecipe(bricks=("shoulder-waist/*",), open=sides)})
+    zipped = part_at_centres(mannequin.layout, poncho, [ZIP.model_copy(update={"seam": "centre front"})])
+    assert {name: piece.open for name, piece in zipped.pieces.items()} == {
+        "cloth_left": ("side left",),
+        "cloth_right": ("side right",),
+    }
+    assert {"centre front", "centre back"} <= {seam.name for seam in mannequin.form(zipped).seams}
+
+
 def test_halves_that_rest_a_little_apart_are_drawn_once(skirt: Garment):
     """A tenth of a millimetre over a side: what a relaxation's tolerance may leave, and more than sides of seams may differ by."""
     half = skirt.pieces["back_left"]

@@ -125,6 +125,8 @@ def test_a_scan_is_measured_at_the_landmarks_that_are_given() -> None:
         InputError, match=r"scan: underbust .* does not lie above waist \(1\.250 m\) on a body 1\.59 m tall"
     ):
         Mannequin.from_scan(points, faces, options=ScanOptions(landmarks={"waist": 1.25}), resolution_mm=20.0)
+    with pytest.raises(InputError, match=r"scan: knee .* does not lie above calf \(0\.900 m\) on a body 1\.59 m tall"):
+        Mannequin.from_scan(points, faces, options=ScanOptions(landmarks={"calf": 0.9}), resolution_mm=20.0)
     # All but the places on a skirt, which are no landmarks of a body, steer the fit.
     assert set(LANDMARKS) - set(PLACES) == {"thigh", "abdomen"}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warpflat.garment.mannequin.rays import row_at
+from warpflat.garment.mannequin.sampled import row_at
 from warpflat.garment.mannequin.scan_limbs import _outermost
 
 

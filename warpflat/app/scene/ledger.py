@@ -138,7 +138,7 @@ def candidate_cuts(
     if usual_only:
         return
     found: set[tuple[Any, ...]] = set()
-    for dart in (dart for name in unsewn for dart in princess_seams(form, name)):
+    for dart in (dart for name in unsewn for dart in princess_seams(form.layout, form.bricks[name], name)):
         found.add((dart.piece, dart.line, dart.part))
         yield from priced(dart)
     for name, piece in unsewn.items():

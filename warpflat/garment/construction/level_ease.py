@@ -15,12 +15,13 @@ from warpflat.garment.mannequin.body_landmarks import model_places
 from warpflat.garment.mannequin.body_model import finer_body
 from warpflat.garment.mannequin.common_body import CommonBody
 from warpflat.garment.mannequin.profiles import convex_girth
-from warpflat.garment.mannequin.slicer import UP, Slicer
+from warpflat.garment.mannequin.scan_levels import TRUNK
+from warpflat.garment.mannequin.slicer import UP, Slicer, largest
 
 __all__ = ["EASE_LEVELS", "level_ease", "widened"]
 
 #: Levels at which ease is measured, from the top down.
-EASE_LEVELS = ("bust", "underbust", "waist", "hip")
+EASE_LEVELS = TRUNK
 # Above the bust what is asked there fades out, up to here.
 _TOP = "front_neck"
 
@@ -39,11 +40,10 @@ def level_ease(
     skin = Slicer(body.vertices, finer_body()[1])
     slicers = [Slicer(vertices, triangles) for vertices, triangles in layers]
     places, nearest, found = model_places(), cKDTree(body.vertices), {}
-    of_arm = places.strips["arm left"] | places.strips["arm right"]
+    of_arm = places.strips["arms"]
     for name in EASE_LEVELS:
         height = body.level(name)
-        parts = [part.points[:, [0, 2]] for part in skin.cut(UP, height)]
-        trunk = max(parts, key=lambda points: float(np.ptp(points, axis=0).prod()))
+        trunk = largest(skin.cut(UP, height)).points[:, [0, 2]]
         middle = 0.5 * (trunk.min(axis=0) + trunk.max(axis=0))
         rings = []
         for part in (part for slicer in slicers for part in slicer.cut(UP, height) if part.closed):
@@ -77,8 +77,7 @@ def widened(
     # A tape that lies so much farther off is longer by a whole turn's share.
     off = [*(more[name] / (2.0 * np.pi) for name in order), 0.0]
     skin = vertex_normals(body.vertices, finer_body()[1])
-    places = model_places()
-    arm = (places.strips["arm left"] | places.strips["arm right"]).astype(float)
+    arm = model_places().strips["arms"].astype(float)
     out = []
     for vertices, triangles in layers:
         near, weight, _ = skin_under(

@@ -24,6 +24,7 @@ from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.forms import Form, PieceRecipe
 from warpflat.garment.mannequin.halves import is_side
 from warpflat.garment.mannequin.layout import RING_LEVELS
+from warpflat.garment.mannequin.part_pieces import part_recipe
 from warpflat.pattern import EdgeRules
 
 if TYPE_CHECKING:
@@ -72,11 +73,11 @@ def part_at_centres(layout: Layout, form: Form, openings: Sequence[OpeningTable]
         parted: dict[str, PieceRecipe] = {}
         for name, recipe in pieces.items():
             bricks = select_bricks(layout, recipe.bricks)
-            sides = {side: tuple(b for b in bricks if is_side(b, side)) for side in ("left", "right")}
+            sides = {side: [b for b in bricks if is_side(b, side)] for side in ("left", "right")}
             on_line = np.isin(layout.faces[layout.faces_of(bricks)], layout.lines[line]).sum() > 1
             if all(sides.values()) and on_line and line not in recipe.open:
                 for side, half in sides.items():
-                    parted[f"{name}_{side}"] = replace(recipe, bricks=half)
+                    parted[f"{name}_{side}"] = part_recipe(layout, recipe, half, [line])
             else:
                 parted[name] = recipe
         pieces = parted

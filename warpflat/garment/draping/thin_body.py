@@ -8,12 +8,12 @@ sticks that go on it has. The thin body is the body less a share of the largest 
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
 from scipy.spatial import cKDTree
 
 from warpflat.core import BoolArray, FloatArray, IntArray, unit
 from warpflat.flat import border_loops, mesh_edges, vertex_normals
 from warpflat.garment.draping.body import Body
+from warpflat.garment.mannequin.sampled import neighbour_mean
 
 __all__ = ["ThinBody", "draw_out_limbs"]
 
@@ -98,9 +98,7 @@ def _inscribed_radius(vertices: FloatArray, triangles: IntArray, normal: FloatAr
         smaller = np.einsum("ij,ij->i", off, off) / (2.0 * np.maximum(height, 1e-9))
         inside = (far < radius - 1e-5) & (height > 1e-6)
         radius = np.where(inside, np.minimum(smaller, radius), radius)
-    i, j = mesh_edges(triangles).T
-    link = coo_array((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), shape=(len(vertices),) * 2).tocsr()
-    share = np.maximum(np.asarray(link.sum(axis=1)).ravel(), 1.0)
+    mean = neighbour_mean(mesh_edges(triangles), len(vertices))
     for _ in range(_SMOOTH):
-        radius = 0.5 * radius + 0.5 * (link @ radius) / share
+        radius = 0.5 * radius + 0.5 * (mean @ radius)
     return radius

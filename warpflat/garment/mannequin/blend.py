@@ -15,11 +15,12 @@ import numpy as np
 
 from warpflat.core import FloatArray, InputError, IntArray, arc_lengths, nearest, polyline_length, unit
 from warpflat.flat import vertex_normals
-from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS, RING_LEVELS, Layout
+from warpflat.garment.mannequin.layout import ARM_LEVELS, EASED_LEVELS, LEG_LEVELS, RING_LEVELS, Layout
 from warpflat.garment.mannequin.profiles import convex_girth, scale_to_girth, upper_hull
+from warpflat.garment.mannequin.sampled import smooth, smoothstep
 from warpflat.garment.mannequin.sheet import fill_fork, fill_sheet, sheet_laplacian
 
-__all__ = ["Adjustment", "adjusted_vertices", "blend_forms", "bridge_row", "bridge_rows", "is_tight", "rule_rows"]
+__all__ = ["Adjustment", "adjusted_vertices", "bridge_row", "bridge_rows", "is_tight", "rule_rows"]
 
 # A fold's mitre runs off to nothing where trunk and arm lie against each other: at most twice as far as either side moves.
 _LEAST_MITRE = 0.5
@@ -72,19 +73,6 @@ def is_tight(profiles: Mapping[str, Adjustment], ease: Mapping[str, float]) -> b
     return min(ease.values(), default=0.0) < 0.0 or any(p.scale < 1.0 or p.offset_cm < 0.0 for p in profiles.values())
 
 
-def blend_forms(first: FloatArray, second: FloatArray, weight: float) -> FloatArray:
-    """Return the surface between two forms of one layout; `weight` 0 is the first, 1 the second.
-
-    Raises:
-        InputError: if the forms are of different layouts or the weight is not from 0 to 1.
-    """
-    if first.shape != second.shape:
-        raise InputError(f"blend: the forms have {len(first)} and {len(second)} vertices; use one resolution for both")
-    if not 0.0 <= weight <= 1.0:
-        raise InputError(f"blend: weight {weight:g}: valid range 0 to 1")
-    return (1.0 - weight) * first + weight * second
-
-
 def adjusted_vertices(
     layout: Layout,
     vertices: FloatArray,
@@ -107,10 +95,10 @@ def adjusted_vertices(
         InputError: for a level that cannot be adjusted, or an order that turns two profiles over.
     """
     ease = ease or {}
-    known = [*RING_LEVELS, "chest", *ARM_LEVELS[1:], *LEG_LEVELS]
+    known = [*EASED_LEVELS, "crotch"]
     for level in ease:
-        if level not in known or level == "crotch":
-            raise InputError(f"form: level {level!r} has no ease: {nearest(level, known)}")
+        if level not in EASED_LEVELS:
+            raise InputError(f"form: level {level!r} has no ease: {nearest(level, EASED_LEVELS)}")
     for level, change in profiles.items():
         for name in (level, change.like):
             if name is not None and name not in known:
@@ -305,7 +293,7 @@ def _lower_sides(move: FloatArray, layout: Layout, body: FloatArray, column: int
     near = 1.0 - np.abs(at) / reach
     share = ((heights[first : bust + 1] - heights[first]) / (heights[chest] - heights[first]))[:, None]
     ids = layout.rings[first : bust + 1, (column + at) % count]
-    move[ids, 1] += lower * share * near * near * (3.0 - 2.0 * near)
+    move[ids, 1] += lower * share * smoothstep(near)
 
 
 def _move_arms(
@@ -316,7 +304,6 @@ def _move_arms(
     ruled: Sequence[tuple[str, str]],
 ) -> None:
     from scipy.interpolate import PchipInterpolator
-    from scipy.ndimage import gaussian_filter1d
 
     for grid in layout.arms.values():
         own, biceps = dict(changes), grid[layout.arm_row["biceps"]]
@@ -332,9 +319,10 @@ def _move_arms(
                 first, elbow, end = (layout.arm_row[level] for level in ("biceps", "elbow", "wrist"))
                 bent = out[grid[first : end + 1]]
                 apart = np.linalg.norm(np.diff(bent.mean(axis=1), axis=0), axis=1)[: 2 * (elbow - first)].mean()
-                smooth = gaussian_filter1d(bent, _ELBOW_BOW / max(apart, 1e-9), axis=0, mode="nearest")
                 near = np.interp(np.arange(first, end + 1), [first, elbow, end], [0.0, 1.0, 0.0])[:, None, None]
-                out[grid[first : end + 1]] = bent + near * near * (3.0 - 2.0 * near) * (smooth - bent)
+                out[grid[first : end + 1]] = bent + smoothstep(near) * (
+                    smooth(bent, _ELBOW_BOW / max(apart, 1e-9)) - bent
+                )
             for pair in ruled:
                 if pair[0] in ARM_LEVELS or pair[1] in ARM_LEVELS:
                     rule_rows(out, grid, layout.arm_row, pair, None)
@@ -393,8 +381,6 @@ def _hang_fork(out: FloatArray, layout: Layout, grid: IntArray) -> None:
     On the body the curve's square corner to the front becomes the thigh's round one within a few centimetres: cut like that,
     the fork would end in a beak. Around the thigh the rows run into the straight leg in a bow, or the outseam would have a corner.
     """
-    from scipy.ndimage import gaussian_filter1d
-
     thigh, knee = layout.leg_row["leg_thigh"], layout.leg_row["leg_knee"]
     ahead, behind = layout.crotch_point + layout.to_princess, len(layout.crotch) - 1 - layout.crotch_point
     at = np.arange(grid.shape[1])
@@ -402,10 +388,9 @@ def _hang_fork(out: FloatArray, layout: Layout, grid: IntArray) -> None:
     _hang(out, layout, grid[: thigh + round(_HANGS * (knee - thigh)) + 1], near)
     rows = out[grid[: knee + 1]]
     apart = float(np.linalg.norm(np.diff(rows[thigh:].mean(axis=1), axis=0), axis=1).mean())
-    smooth = gaussian_filter1d(rows, _THIGH_BOW / max(apart, 1e-9), axis=0, mode="nearest")
     ramp = np.interp(np.arange(knee + 1), [0, 0.5 * thigh, 0.5 * (thigh + knee), knee], [0.0, 1.0, 1.0, 0.0])
-    weight = (ramp * ramp * (3.0 - 2.0 * ramp))[:, None, None]
-    out[grid[1:knee]] += (weight * (smooth - rows))[1:knee]
+    bow = smooth(rows, _THIGH_BOW / max(apart, 1e-9)) - rows
+    out[grid[1:knee]] += (smoothstep(ramp)[:, None, None] * bow)[1:knee]
 
 
 def _take_in_thigh(out: FloatArray, body: FloatArray, grid: IntArray, thigh: int, wished: float) -> None:
@@ -456,7 +441,7 @@ def _hang(out: FloatArray, layout: Layout, grid: IntArray, near: FloatArray | No
         for axis in range(3):
             hung[:, column, axis] = np.interp(arc[:, column], arc[touch, column], rows[touch, column, axis])
     share = (arc / arc[-1])[..., None]
-    weight = 1.0 if near is None else (near * near * (3.0 - 2.0 * near))[:, None]
+    weight = 1.0 if near is None else smoothstep(near)[:, None]
     out[grid[1:-1]] += (weight * (1.0 - share * share) * (hung - rows))[1:-1]
 
 

@@ -6,19 +6,14 @@ Size tables and scans both answer with a :class:`Blueprint`; one builder lays th
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
-
-import numpy as np
+from dataclasses import dataclass
 
 from warpflat.core import FloatArray
 
-__all__ = ["NOTCH", "ArmCurves", "Blueprint", "LegCurves", "LegProfile", "Profile", "QuarterCurves", "mirrored"]
+__all__ = ["NOTCH", "Blueprint", "LegCurves", "LegProfile", "Profile", "QuarterCurves"]
 
 #: How high up the armhole the across-chest row ends; the armhole runs slantwise there, which leaves the quads room.
 NOTCH = 0.22
-
-_Curves = TypeVar("_Curves", "QuarterCurves", "ArmCurves")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -27,13 +22,12 @@ class Profile:
 
     Attributes:
         curve: #P by 2, (x, z) [m], from centre front over the body's left side, not repeated.
-        centre_front, side_left, centre_back, side_right: arc lengths [m] along the curve.
+        side_left, centre_back, side_right: arc lengths [m] along the curve.
         princess: share of each quarter from its centre line to the princess line, by quarter name.
         girth: what a tape must read around the finished row [m].
     """
 
     curve: FloatArray
-    centre_front: float
     side_left: float
     centre_back: float
     side_right: float
@@ -47,7 +41,6 @@ class QuarterCurves:
 
     Attributes:
         neckline: from the centre line to the side neck point.
-        bend: share of the neckline at which the yoke row starts.
         shoulder: from the side neck point to the shoulder point; the same in front and back.
         armhole: from the shoulder point to the underarm point.
         notch: share of the armhole at which the across-chest row ends.
@@ -61,34 +54,6 @@ class QuarterCurves:
     notch: float
     chest: FloatArray
     centre: FloatArray
-    bend: float = 0.52
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ArmCurves:
-    """Closed curves around one arm, each from the underarm line forward. All #P by 3 [m].
-
-    Attributes:
-        biceps, elbow, wrist: the curves; the first point is on the underarm line, the opposite one on the overarm line.
-        between: further curves by their place: 0 is the biceps, 1 the elbow, 2 the wrist.
-    """
-
-    biceps: FloatArray
-    elbow: FloatArray
-    wrist: FloatArray
-    between: Mapping[float, FloatArray] = field(default_factory=dict)
-
-    @property
-    def by_place(self) -> dict[float, FloatArray]:
-        """All curves by their place, from the biceps to the wrist."""
-        return dict(sorted({0.0: self.biceps, 1.0: self.elbow, 2.0: self.wrist, **self.between}.items()))
-
-
-def mirrored(curves: _Curves) -> _Curves:
-    """Return the curves of the other side of a symmetric body."""
-    lines = {name: line for name, line in vars(curves).items() if isinstance(line, np.ndarray)}
-    flipped: dict[str, Any] = {name: line * [-1.0, 1.0, 1.0] for name, line in lines.items()}
-    return replace(curves, **flipped)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,17 +62,15 @@ class LegProfile:
 
     Attributes:
         curve: #P by 2, (x, z) [m], from the inseam forward, not repeated.
-        crease_front, outseam, crease_back: shares of the curve's length.
+        outseam: share of the curve's length; the creases lie halfway to it.
         girth: what a tape must read around the finished row [m].
         spread: how much wider than the mean the columns next to the inseam are, as a share.
     """
 
     curve: FloatArray
-    crease_front: float
     outseam: float
-    crease_back: float
     girth: float
-    spread: float = 0.0
+    spread: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -137,7 +100,8 @@ class Blueprint:
         profile: the profile at a height [m] between the ankle and the bust.
         heights: height [m] of every closed level.
         quarters: the curves of the four quarters by name.
-        arms: the curves of the two arms, ``left`` and ``right``.
+        arms: the closed curves around the two arms, ``left`` and ``right``, by their place, rising: 0 is the biceps, 1 the elbow, 2 the
+            wrist; each #P by 3 [m], from the underarm line forward, the opposite point on the overarm line.
         legs: crotch curve and legs.
         neck: length of the neck base along its curve [m].
         collar: #P by 3 [m], closed curve at the upper end of the neck, from centre front over the left.
@@ -147,7 +111,7 @@ class Blueprint:
     profile: Callable[[float], Profile]
     heights: Mapping[str, float]
     quarters: Mapping[str, QuarterCurves]
-    arms: Mapping[str, ArmCurves]
+    arms: Mapping[str, Mapping[float, FloatArray]]
     legs: LegCurves
     neck: float
     collar: FloatArray

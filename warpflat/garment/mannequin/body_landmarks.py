@@ -54,7 +54,8 @@ class Places:
 
     Attributes:
         mean: #V by 3, on the mean body, 1 m tall.
-        strips: #V each: "trunk", "front", "back", "neck", "head", "leg left", "leg right", "arm left", "arm right".
+        strips: #V each: "trunk", "front", "back", "neck", "head", "leg left", "leg right", "arm left", "arm right", "arms".
+        plain: #V, neither of head, hands nor feet.
         along: #V, of arms, the distance from the elbow towards the hand along the bones of the mean body.
         halves: by side, whether a triangle is of trunk, leg or head, #T.
         arms: by side, whether a triangle is of an arm or of what joins it, #T.
@@ -63,6 +64,7 @@ class Places:
 
     mean: FloatArray
     strips: Mapping[str, BoolArray]
+    plain: BoolArray
     along: FloatArray
     halves: Mapping[str, BoolArray]
     arms: Mapping[str, BoolArray]
@@ -82,7 +84,7 @@ def model_places() -> Places:
         "trunk": trunk, "front": trunk & (np.abs(x) < 0.07) & (z > 0.0), "back": trunk & (np.abs(x) < 0.07) & (z < 0.0),
         "neck": (np.abs(x) > 0.02) & (np.abs(x) < 0.07) & (np.abs(z) < 0.03), "head": kind == "neck01",
     }  # fmt: skip
-    on_arm = weights[:, [name in ("upperarm01", "lowerarm01") for name in names]].sum(axis=1)
+    on_arm = finer @ model.share_of("upperarm01", "lowerarm01")
     along = np.zeros(len(mean))
     halves, arms = {}, {}
     for side, letter, sign in (("left", "L", 1.0), ("right", "R", -1.0)):
@@ -103,9 +105,11 @@ def model_places() -> Places:
         arm = (hangs == hangs[np.argmax(sign * x)])[triangles].any(axis=1)
         halves[side] = on_side & ~arm & (on_arm[triangles] < 0.5).any(axis=1)
         arms[side] = on_side & (on_arm[triangles] > _OF_ARM).any(axis=1)
+    strips["arms"] = strips["arm left"] | strips["arm right"]
     return Places(
-        mean=mean, strips=strips, along=along, halves=halves, arms=arms, middle=np.flatnonzero(np.abs(x) < 1e-6)
-    )
+        mean=mean, strips=strips, plain=finer @ model.detail.astype(float) < 0.5, along=along, halves=halves, arms=arms,
+        middle=np.flatnonzero(np.abs(x) < 1e-6),
+    )  # fmt: skip
 
 
 def meeting(vertices: FloatArray, mean: FloatArray, sign: float) -> int:

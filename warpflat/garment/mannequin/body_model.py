@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from warpflat.core import FloatArray, unit
+from warpflat.flat import half_edges
 
 __all__ = ["BodyModel", "Person", "finer_body", "rotation", "rotation_vector"]
 
@@ -119,33 +120,47 @@ class BodyModel:
         """Return vertices and joints (#V + #J by 3) of a shape in the standard pose, before scale and place."""
         return self.mean + np.tensordot(shape, self.shapes, 1)
 
-    def frames(self, joints: FloatArray, bend: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return how each joint moves what hangs from it: rotations (#J + 1 by 3 by 3) and shifts (#J + 1 by 3); the last is the pelvis.
+    def share_of(self, *joints: str) -> FloatArray:
+        """Return #V, the share that joints of these names, on both sides, have in each vertex."""
+        return self.weights[:, [k for k, name in enumerate(self.joints) if name.split(".")[0] in joints]].sum(axis=1)
 
-        Args:
-            joints: #J by 3, in the standard pose.
-            bend: #J by 3 by 3.
+    def mean_person(self, arms: float, seat: tuple[float, float] = (0.0, 0.0)) -> Person:
+        """Return the mean body, 1 m tall, with arms raised by an angle, and hips and knees bent about the axis to the left [rad]."""
+        bend = np.zeros((len(self.joints), 3))
+        for side, sign in (("L", 1.0), ("R", -1.0)):
+            bend[self.joints.index(f"upperarm01.{side}"), 2] = sign * arms
+            for joint, angle in zip(("upperleg01", "lowerleg01"), seat, strict=True):
+                bend[self.joints.index(f"{joint}.{side}"), 0] = angle
+        return Person(
+            shape=np.zeros(len(self.shapes)), bend=rotation(bend), turn=np.eye(3), scale=1.0, place=np.zeros(3)
+        )
+
+    def frames(self, person: Person) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return how each joint moves what hangs from it, before scale, turn and place of the body.
+
+        Returns:
+            vertices and joints in the standard pose (#V + #J by 3); rotations (#J + 1 by 3 by 3) and shifts (#J + 1 by 3), the pelvis last.
         """
+        rest, bend = self.shaped(person.shape), person.bend
         turn, shift = np.tile(np.eye(3), (len(bend) + 1, 1, 1)), np.zeros((len(bend) + 1, 3))
         for joint, parent in enumerate(self.parents):
             turn[joint] = turn[parent] @ bend[joint]
-            shift[joint] = shift[parent] + (turn[parent] - turn[joint]) @ joints[joint]
-        return turn, shift
+            shift[joint] = shift[parent] + (turn[parent] - turn[joint]) @ rest[self.count + joint]
+        return rest, turn, shift
 
     def vertices(self, person: Person) -> FloatArray:
         """Return the vertices of a person, #V by 3 [m]."""
-        rest = self.shaped(person.shape)
-        turn, shift = self.frames(rest[self.count :], person.bend)
-        blended = (self.weights @ turn.reshape(-1, 9)).reshape(-1, 3, 3)
-        posed = np.matmul(blended, rest[: self.count, :, None])[:, :, 0] + self.weights @ shift
+        rest, turn, shift = self.frames(person)
+        posed = np.matmul(_blended(self.weights, turn), rest[: self.count, :, None])[:, :, 0] + self.weights @ shift
         return person.scale * posed @ person.turn.T + person.place
 
     def joints_of(self, person: Person) -> FloatArray:
         """Return the joints of a person, #J by 3 [m]."""
-        rest = self.shaped(person.shape)[self.count :]
-        turn, shift = self.frames(rest, person.bend)
-        at = np.einsum("jab,jb->ja", turn[self.parents], rest) + shift[self.parents]
-        return np.asarray(person.scale * at @ person.turn.T + person.place)
+        return np.asarray(person.scale * self._joints(*self.frames(person)) @ person.turn.T + person.place)
+
+    def _joints(self, rest: FloatArray, turn: FloatArray, shift: FloatArray) -> FloatArray:
+        """Return the joints in a pose (#J by 3) of :meth:`frames`."""
+        return np.einsum("jab,jb->ja", turn[self.parents], rest[self.count :]) + shift[self.parents]
 
     def rebend(self, person: Person, other: Person, finer: csr_array, points: FloatArray) -> FloatArray:
         """Return points laid on a person as they lie on the same person in another pose.
@@ -159,12 +174,8 @@ class BodyModel:
             finer: #P by #V, the model's place of each point.
             points: #P by 3 [m].
         """
-        joints, weights = self.shaped(person.shape)[self.count :], finer @ self.weights
-        turns = []
-        for each in (person, other):
-            turn, _ = self.frames(joints, each.bend)
-            turns.append(each.turn @ turn)
-        between = (weights @ (turns[1] @ turns[0].transpose(0, 2, 1)).reshape(-1, 9)).reshape(-1, 3, 3)
+        before, after = (each.turn @ self.frames(each)[1] for each in (person, other))
+        between = _blended(finer @ self.weights, after @ before.transpose(0, 2, 1))
         u, size, v = np.linalg.svd(between)
         off = points - finer @ self.vertices(person)
         follows = np.clip((size[:, -1] - _FOLDED) / (1.0 - _FOLDED), 0.0, 1.0)
@@ -181,8 +192,7 @@ class BodyModel:
 
     def turned(self, person: Person, normals: FloatArray) -> FloatArray:
         """Return directions at the vertices (#V by 3), given in the standard pose, as they turn with the joints and the body."""
-        turn, _ = self.frames(self.shaped(person.shape)[self.count :], person.bend)
-        blended = (self.weights @ turn.reshape(-1, 9)).reshape(-1, 3, 3)
+        blended = _blended(self.weights, self.frames(person)[1])
         return unit(np.matmul(blended, normals[:, :, None])[:, :, 0] @ person.turn.T)
 
     @cached_property
@@ -196,20 +206,19 @@ class BodyModel:
         space, its place [m], and the logarithm of its scale.
         """
         n, joints, shapes = self.count, len(self.parents), len(self.shapes)
-        rest = self.shaped(person.shape)
-        turn, shift = self.frames(rest[n:], person.bend)
+        rest, turn, shift = self.frames(person)
         out = np.empty((n, 3, shapes + 3 * joints + 7))
         spin = person.scale * person.turn
         # Shapes move the vertices, and the joints about which they are bent.
         move = np.zeros((joints + 1, shapes, 3))
         for joint, parent in enumerate(self.parents):
             move[joint] = move[parent] + self.shapes[:, n + joint] @ (turn[parent] - turn[joint]).T
-        spun = spin @ (self.weights @ turn.reshape(joints + 1, 9)).reshape(n, 3, 3)
+        spun = spin @ _blended(self.weights, turn)
         about = (self.weights @ (move @ spin.T).transpose(0, 2, 1).reshape(joints + 1, -1)).reshape(n, 3, shapes)
         out[:, :, :shapes] = np.matmul(spun, self._by_shape) + about
         # A joint turns all that hangs from it about its own place.
         each = (rest[:n] @ turn.transpose(0, 2, 1) + shift[:, None]) * self.weights.T[:, :, None]
-        at = np.einsum("jab,jb->ja", turn[self.parents], rest[n:]) + shift[self.parents]
+        at = self._joints(rest, turn, shift)
         hung = (self.below @ each.reshape(joints + 1, -1)).reshape(joints, n, 3)
         hung -= (self.below @ self.weights.T)[:, :, None] * at[:, None]
         by_joint = np.matmul(spin, -_cross(hung.transpose(1, 0, 2).reshape(-1, 3)))
@@ -224,14 +233,14 @@ class BodyModel:
 
     def departures(self, person: Person) -> FloatArray:
         """Return how far a person departs from the mean: shapes, then bends in the frames of the joints' parents [rad]."""
-        turn, _ = self.frames(self.shaped(person.shape)[self.count :], person.bend)
+        turn = self.frames(person)[1]
         bends = np.einsum("jab,jb->ja", turn[self.parents], rotation_vector(person.bend))
         return np.concatenate([person.shape, bends.ravel()])
 
     def moved(self, person: Person, step: FloatArray) -> Person:
         """Return a person after a step in the parameters of :meth:`jacobian`."""
         shapes, joints = len(self.shapes), len(self.parents)
-        turn, _ = self.frames(self.shaped(person.shape)[self.count :], person.bend)
+        turn = self.frames(person)[1]
         small = rotation(step[shapes : shapes + 3 * joints].reshape(-1, 3))
         parent = turn[self.parents]
         return Person(
@@ -253,11 +262,9 @@ def finer_body() -> tuple[csr_array, NDArray[np.int64]]:
 
     model = BodyModel.load()
     n, faces = model.count, model.triangles
-    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
-    edges, inverse = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
-    inverse = np.ravel(inverse)
+    he = half_edges(faces)
+    edges, inverse, sides = he.edges.astype(np.int64), he.edge, he.count
     far = np.roll(faces, 1, axis=1).ravel()
-    sides = np.bincount(inverse, minlength=len(edges))
     # An inner edge's vertex takes 3/8 of its ends and 1/8 of the corners across; a border's the mean of its ends.
     at_end = np.where(sides == 2, 0.375, 0.5)
     half = sides[inverse] == 2
@@ -277,6 +284,11 @@ def finer_body() -> tuple[csr_array, NDArray[np.int64]]:
     ab, bc, ca = n + inverse.reshape(-1, 3).T
     finer = [(a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca)]
     return matrix, np.concatenate([np.stack(each, axis=1) for each in finer])
+
+
+def _blended(weights: FloatArray, turn: FloatArray) -> FloatArray:
+    """Return the matrices (#N by 3 by 3) of points with shares in joints (#N by #J + 1) that turn (#J + 1 by 3 by 3)."""
+    return np.asarray((weights @ turn.reshape(-1, 9)).reshape(-1, 3, 3))
 
 
 def _cross(vectors: FloatArray) -> FloatArray:

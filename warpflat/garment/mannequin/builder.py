@@ -20,6 +20,8 @@ __all__ = ["build_trunk", "build_vertices", "girth_ring", "quarter_fractions"]
 # operator shrinks with the square of the edge, a curve's count of vertices with its inverse: hence the power by which it follows the
 # resolution. And how often the sheet is drawn to a scan.
 _GUIDE, _ATTRACT_ROUNDS = 0.01, 4
+# Share of the neckline at which the yoke row starts.
+_BEND = 0.52
 # So far [m] below the underarm the bust's row meets the side, where the rows below it keep this share of the height: a dart
 # from there keeps off the armhole.
 _DART_ROOM, _LEAST_SHARE = 0.043, 0.2
@@ -77,7 +79,7 @@ def build_vertices(layout: Layout, blueprint: Blueprint, trunk: FloatArray | Non
     m2, m3 = len(layout.front) - 1, len(layout.yokes["front-left"]) - 1
     for name in QUARTERS:
         c = blueprint.quarters[name]
-        vertices[_quarter_ids(layout, name)[0]] = _pieces(c.neckline, [0.0, c.bend, 1.0], [n0, m3])
+        vertices[_quarter_ids(layout, name)[0]] = _pieces(c.neckline, [0.0, _BEND, 1.0], [n0, m3])
     loop = layout.neck[0]
     vertices[loop] = _to_length(vertices[loop], blueprint.neck)
     for name in QUARTERS:
@@ -90,7 +92,7 @@ def build_vertices(layout: Layout, blueprint: Blueprint, trunk: FloatArray | Non
         # The yoke row ends as far down the armhole as the neckline's bend lies below the shoulder seam, within what leaves
         # both strips of rows room.
         upper = c.notch * polyline_length(c.armhole)
-        drop = (1.0 - c.bend) * polyline_length(c.neckline)
+        drop = (1.0 - _BEND) * polyline_length(c.neckline)
         yoke = c.notch * float(np.clip(0.9 * drop / max(upper, 1e-9), 0.22, 0.5))
         vertices[armhole] = _pieces(c.armhole, [0.0, yoke, c.notch, 1.0], [m3, m2, n3])
     # The side lines go straight on from the rows below the bust to the underarm points, without a kink.
@@ -127,13 +129,7 @@ def quarter_fractions(layout: Layout, princess: float) -> FloatArray:
 def girth_ring(layout: Layout, profile: Profile, height: float) -> FloatArray:
     """Return one closed row of the grid, #columns by 3 [m]; a tape around it reads exactly the profile's girth."""
     total = polyline_length(profile.curve, closed=True)
-    ends = (
-        profile.centre_front,
-        profile.side_left,
-        profile.centre_back,
-        profile.side_right,
-        total + profile.centre_front,
-    )
+    ends = (0.0, profile.side_left, profile.centre_back, profile.side_right, total)
     at: list[FloatArray] = []
     for i, name in enumerate(QUARTERS):
         shares = quarter_fractions(layout, profile.princess[name])
@@ -184,7 +180,7 @@ def _set_arms(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> Non
     from scipy.interpolate import PchipInterpolator
 
     for side, grid in layout.arms.items():
-        c = blueprint.arms[side]
+        curves = blueprint.arms[side]
         hole = vertices[grid[0]]
         # Columns keep the places they have on the armhole, by arc, from the underarm over the front to the top.
         half = grid.shape[1] // 2
@@ -193,11 +189,11 @@ def _set_arms(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> Non
             np.arange(len(hole)) <= half, 0.5 * s[:-1] / s[half], 0.5 + 0.5 * (s[:-1] - s[half]) / (s[-1] - s[half])
         )
         even = np.arange(len(hole)) / len(hole)
-        places = np.array(list(c.by_place))
+        places = np.array(list(curves))
         evened = np.interp(places, [0.0, 1.0, 2.0], [0.5, 0.8, 1.0])
         rings = [
             _to_length(resample(loop, w * even + (1 - w) * shares, closed=True), polyline_length(loop, closed=True))
-            for loop, w in zip(c.by_place.values(), evened, strict=True)
+            for loop, w in zip(curves.values(), evened, strict=True)
         ]
         rows = layout.arm_row
         at = np.interp(places, [0.0, 1.0, 2.0], [rows["biceps"], rows["elbow"], rows["wrist"]])
@@ -302,7 +298,7 @@ def leg_ring(layout: Layout, profile: LegProfile, height: float) -> FloatArray:
     """Return one closed row of a leg, #columns by 3 [m]; a tape around it reads exactly the profile's girth."""
     inner, outer = layout.to_outseam - layout.quarter + layout.to_princess, layout.quarter - layout.to_princess
     back = len(layout.crotch) - 1 - layout.crotch_point + layout.to_princess
-    a, b, c = profile.crease_front, profile.outseam, profile.crease_back
+    a, b, c = 0.5 * profile.outseam, profile.outseam, 0.5 * (1.0 + profile.outseam)
     # Next to the inseam the columns keep the wider spacing that they have on the crotch curve.
     near, far = _widened(inner, profile.spread), 1.0 - _widened(back, profile.spread)[::-1]
     shares = [

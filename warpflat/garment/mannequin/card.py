@@ -15,7 +15,9 @@ from warpflat.garment.mannequin.body_landmarks import ARM_PLACES, model_places, 
 from warpflat.garment.mannequin.body_model import finer_body
 from warpflat.garment.mannequin.bricks import TRUNK_LEVELS
 from warpflat.garment.mannequin.head import head_of
-from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS
+from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS, TRUNK_RINGS
+from warpflat.garment.mannequin.measurements import TAKEN_ALONG
+from warpflat.garment.mannequin.picture import LINE
 from warpflat.pattern import GREY, SKIN, Facets, View, draw_row, drawn_page
 
 if TYPE_CHECKING:
@@ -51,16 +53,8 @@ _HOW: Mapping[str, str] = {
     "ankle_girth": "around one ankle, above the bone",
     "foot": "around the ball, where it is broadest",
 }
-#: By measurement the line of the body on which it lies; lengths run between two heights of a line.
-_LINES = {
-    "neck": "neck", "shoulder": "shoulder left", "bust": "bust", "underbust": "underbust", "chest_width": "chest front",
-    "back_width": "chest back", "waist": "waist", "abdomen": "abdomen", "hip": "hip", "upper_arm": "biceps left",
-    "elbow": "elbow left", "wrist": "wrist left", "arm_length": "overarm left", "inside_leg": "inseam left",
-    "thigh_girth": "thigh left", "knee_girth": "knee left", "calf_girth": "calf left", "ankle_girth": "ankle left",
-}  # fmt: skip
 _BEHIND = ("back_width", "armscye_depth", "nape_to_waist")
 _PAGE = (8.27, 11.69)  # [in], A4
-_LINE = "#9c1f30"
 _HEIGHT, _TOP = 5.0, 10.75  # of the figures, and where they begin [in]
 _INTO_LIMB = 0.012  # hands and feet reach so far into arms and legs, of the stature
 
@@ -76,19 +70,11 @@ def needed_measurements(bands: Collection[tuple[str, str]], *, hood: bool = Fals
     for upper, lower in bands:
         if upper in TRUNK_LEVELS:
             covered = TRUNK_LEVELS[TRUNK_LEVELS.index(upper) : TRUNK_LEVELS.index(lower) + 1]
-            found |= set(covered) & {"bust", "underbust", "waist", "abdomen", "hip"}
+            found |= set(covered) & set(TRUNK_RINGS)
             found |= {"hip"} if set(covered) & {"thigh", "knee", "ankle"} else set()
             if upper == "shoulder":
-                found |= {
-                    "head",
-                    "neck",
-                    "shoulder",
-                    "bust_points",
-                    "chest_width",
-                    "back_width",
-                    "armscye_depth",
-                    "nape_to_waist",
-                }
+                found |= {"head", "neck", "shoulder", "bust_points", "chest_width", "back_width"}
+                found |= {"armscye_depth", "nape_to_waist"}
         elif upper in ARM_LEVELS:
             covered = ARM_LEVELS[: ARM_LEVELS.index(lower) + 1]
             found |= {"upper_arm", "arm_length"} | ({"elbow"} if "elbow" in covered else set())
@@ -147,17 +133,17 @@ def write_measurement_card(
             view, names = drawn.view, [name for name in needed if (name in _BEHIND) is is_behind]
             lines = {name: drawn.to_page(tapes[name] @ view.directions.T) for name in names}
             for line in lines.values():
-                pen.line(line, width=1.6, colour=_LINE, halo=True)
+                pen.line(line, width=1.6, colour=LINE, halo=True)
             for name, line in lines.items():
                 # A number lies on its tape: in the middle of a girth, half-way along a length, but where another one lies there.
                 at = {"bust_points": 0, "arm_length": 2 * len(line) // 3}
                 closed = np.allclose(line[0], line[-1])
                 x, y = (line.min(axis=0) + line.max(axis=0)) / 2 if closed else line[at.get(name, len(line) // 2)]
-                pen.badge(float(x), float(y), str(number[name]), _LINE)
+                pen.badge(float(x), float(y), str(number[name]), LINE)
         row = min(0.27, 5.1 / max(len(number), 1))
         y = _TOP - _HEIGHT - 0.35
         for name, k in number.items():
-            pen.write(0.62, y, str(k), 9.5, fontweight="bold", color=_LINE, ha="right")
+            pen.write(0.62, y, str(k), 9.5, fontweight="bold", color=LINE, ha="right")
             pen.write(0.74, y, name.replace("_", " "), 9.5, fontweight="bold")
             words = textwrap.shorten(_HOW[name], 86, placeholder=" …")
             pen.write(1.95, y, words, 8.2, color=GREY)
@@ -222,4 +208,4 @@ def _tape(mannequin: Mannequin, name: str) -> FloatArray:
     if name == "bust_points":
         row = layout.rings[layout.level_row["bust"]]
         return at[row[np.arange(-layout.to_princess, layout.to_princess + 1) % len(row)]]
-    return at[layout.lines[_LINES[name]]]
+    return at[layout.lines[TAKEN_ALONG[name]]]

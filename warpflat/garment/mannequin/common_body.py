@@ -21,7 +21,7 @@ from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.read_body import read_body
 from warpflat.garment.mannequin.scan_levels import TRUNK
 from warpflat.garment.mannequin.scan_pose import ScanOptions
-from warpflat.garment.mannequin.slicer import UP, Slicer
+from warpflat.garment.mannequin.slicer import UP, Slicer, largest
 from warpflat.garment.mannequin.stand_body import lay_on_scan
 
 __all__ = ["CommonBody"]
@@ -93,12 +93,11 @@ class CommonBody:
         # Laid on the mannequin its levels are some millimetres off: they go where the mannequin has them, and what lies between follows.
         places, heights = model_places(), vertices[:, 1]
         for _ in range(_MOVES):
-            arms = places.strips["arm left"] | places.strips["arm right"]
             own = np.array(
                 [np.mean([height_of(name, vertices, side) for side in ("left", "right")]) for name in _LEVELS]
             )
             move = np.interp(heights, own, [levels[name].height for name in _LEVELS] - own)
-            vertices = vertices + np.outer(np.where(arms, 0.0, move), [0.0, 1.0, 0.0])
+            vertices = vertices + np.outer(np.where(places.strips["arms"], 0.0, move), [0.0, 1.0, 0.0])
             vertices, _ = lay_on_scan(vertices, mesh)
             heights = vertices[:, 1]
         # So would the ends of its shoulders and its underarms: a table may have both where no body of that girth has them.
@@ -118,9 +117,8 @@ class CommonBody:
     @lru_cache(maxsize=1)
     def skin_triangles() -> NDArray[np.int64]:
         """Return the triangles of the common mesh that cloth lies over: without head, hands and feet."""
-        finer, triangles = finer_body()
-        plain = finer @ BodyModel.load().detail.astype(float) < 0.5
-        return triangles[plain[triangles].all(axis=1)]
+        triangles = finer_body()[1]
+        return triangles[model_places().plain[triangles].all(axis=1)]
 
     @cached_property
     def skin(self) -> Mesh:
@@ -133,9 +131,8 @@ class CommonBody:
 
     def middle_in_file(self, name: str) -> FloatArray:
         """Return the middle of a level of the trunk, in the body's file [its unit]."""
-        cut = Slicer(self.vertices, finer_body()[1]).cut(UP, self.level(name))
-        trunk = max((part.points for part in cut), key=lambda points: float(np.ptp(points[:, 0])))
-        return np.asarray((trunk.mean(axis=0) - self.shift) @ np.linalg.inv(self.turn))
+        trunk = largest(Slicer(self.vertices, finer_body()[1]).cut(UP, self.level(name)))
+        return np.asarray((trunk.points.mean(axis=0) - self.shift) @ np.linalg.inv(self.turn))
 
     def in_pose_of(self, other: CommonBody) -> CommonBody:
         """Return this body as it stands where another one does, and with its joints bent as the other's."""

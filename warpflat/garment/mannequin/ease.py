@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from warpflat.core import InputError, is_number, nearest, quote_value
-from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LEVELS, RING_LEVELS
+from warpflat.garment.mannequin.layout import EASED_LEVELS
 
 __all__ = ["EASE_PRESETS", "EASE_RANGE", "ease_from"]
 
@@ -59,13 +59,12 @@ def ease_from(value: Any, where: str, *, base: Mapping[str, float] | None = None
         if name not in EASE_PRESETS:
             raise InputError(f"{where}: ease {quote_value(name)} is unknown: {nearest(str(name), EASE_PRESETS)}")
         found = dict(EASE_PRESETS[name])
-    known = [*RING_LEVELS, "chest", *ARM_LEVELS[1:], *LEG_LEVELS[1:]]
     for level, ease in table.items():
         if level == "preset":
             continue
-        if level not in known:
+        if level not in EASED_LEVELS:
             raise InputError(
-                f"{where}: ease: level {quote_value(level)} is unknown: {nearest(level, [*known, 'preset'])}"
+                f"{where}: ease: level {quote_value(level)} is unknown: {nearest(level, [*EASED_LEVELS, 'preset'])}"
             )
         if not is_number(ease) or not EASE_RANGE[0] <= ease <= EASE_RANGE[1]:
             raise InputError(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from warpflat.core import FloatArray
 from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.body_landmarks import PLACES, height_weights
-from warpflat.garment.mannequin.body_model import BodyModel, Person, rotation
+from warpflat.garment.mannequin.body_model import BodyModel, Person
 from warpflat.garment.mannequin.closest import Mesh
 
 __all__ = ["FEW", "SAMPLES", "FittedBody", "fit_body", "step_within"]
@@ -129,17 +129,8 @@ def fit_body(
 
 def _start(model: BodyModel, vertices: FloatArray, arms: float, seat: tuple[float, float]) -> Person:
     """Return the mean body, as tall as the scan and in its place, with its arms, and its hips and knees, bent [rad]."""
-    bend = np.zeros((len(model.joints), 3))
-    for side, sign in (("L", 1.0), ("R", -1.0)):
-        bend[model.joints.index(f"upperarm01.{side}"), 2] = sign * arms
-        for joint, angle in zip(("upperleg01", "lowerleg01"), seat, strict=True):
-            bend[model.joints.index(f"{joint}.{side}"), 0] = angle
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    height = high[1] - low[1]
-    person = Person(
-        shape=np.zeros(len(model.shapes)), bend=rotation(bend), turn=np.eye(3), scale=1.0, place=np.zeros(3)
-    )
-    person = replace(person, scale=float(height / np.ptp(model.vertices(person)[:, 1])))
+    low, high, person = vertices.min(axis=0), vertices.max(axis=0), model.mean_person(arms, seat)
+    person = replace(person, scale=float((high[1] - low[1]) / np.ptp(model.vertices(person)[:, 1])))
     posed = model.vertices(person)
     place = np.array([
         0.5 * (low[0] + high[0]) - 0.5 * (posed[:, 0].min() + posed[:, 0].max()),

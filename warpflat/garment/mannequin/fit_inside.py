@@ -6,12 +6,14 @@ body costs most, cloth that hangs far off little. Nothing but the garment says h
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core import FloatArray
 from warpflat.flat import vertex_normals
-from warpflat.garment.mannequin.body_model import BodyModel, Person, rotation
+from warpflat.garment.mannequin.body_model import BodyModel, Person
 from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.fit_body import FEW, SAMPLES, FittedBody, step_within
 
@@ -76,9 +78,6 @@ def fit_inside(vertices: FloatArray, triangles: NDArray[np.int64]) -> FittedBody
 
 def _start(model: BodyModel, vertices: FloatArray, points: FloatArray, arms: float, floor: float) -> Person:
     """Return the mean body of the usual stature with its soles at a height, amid the garment, its arms bent."""
-    bend = np.zeros((len(model.joints), 3))
-    for side, sign in (("L", -1.0), ("R", 1.0)):
-        bend[model.joints.index(f"upperarm01.{side}"), 2] = sign * arms
     mean = model.mean[: model.count]
     scale = _STATURE / float(np.ptp(mean[:, 1]))
     place = np.array([
@@ -86,7 +85,7 @@ def _start(model: BodyModel, vertices: FloatArray, points: FloatArray, arms: flo
         floor - scale * float(mean[:, 1].min()),
         float(np.median(points[:, 2])) - scale * float(np.median(mean[:, 2])),
     ])  # fmt: skip
-    return Person(shape=np.zeros(len(model.shapes)), bend=rotation(bend), turn=np.eye(3), scale=scale, place=place)
+    return replace(model.mean_person(-arms), scale=scale, place=place)
 
 
 def _step(

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import functools
-import importlib.resources
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,10 +18,11 @@ from warpflat.core import (
     check_file_name,
     nearest,
     quote_value,
+    read_toml,
     same_file,
     short_repr,
 )
-from warpflat.garment.mannequin.blend import Adjustment, adjusted_vertices, blend_forms, is_tight
+from warpflat.garment.mannequin.blend import Adjustment, adjusted_vertices, is_tight
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.darts import (
     FormDart,
@@ -54,11 +54,6 @@ from warpflat.garment.mannequin.sleeves import (
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.layout import Layout
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 __all__ = ["Form", "FormResult", "PieceRecipe", "form_from_mapping", "form_names", "realise", "shipped_form"]
 
@@ -238,10 +233,8 @@ class FormResult:
 
 @functools.cache
 def _shipped() -> dict[str, Any]:
-    text = (
-        importlib.resources.files("warpflat.garment.mannequin").joinpath("data/forms.toml").read_text(encoding="utf-8")
-    )
-    return tomllib.loads(text)
+    with resources.as_file(resources.files("warpflat.garment.mannequin") / "data/forms.toml") as path:
+        return read_toml(path)
 
 
 def form_names() -> list[str]:
@@ -443,7 +436,7 @@ def _surface(
     tight = is_tight(form.profiles, form.ease)
     if form.blend is not None:
         other, weight = form.blend
-        vertices = blend_forms(vertices, _surface(layout, body, other, used), weight)
+        vertices = (1.0 - weight) * vertices + weight * _surface(layout, body, other, used)
         tight = tight or is_tight(other.profiles, other.ease)
     if neckline is not None:
         # It moves vertices within the form's faces, which are chords of the body's hollows.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from warpflat.core import FloatArray, IntArray
-from warpflat.flat import border_loops
 from warpflat.garment.mannequin.body_landmarks import LEVELS, model_places, near_level
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.profiles import convex_girth
@@ -33,10 +32,7 @@ def head_of(mannequin: Mannequin) -> tuple[FloatArray, IntArray] | None:
     tape = mannequin.measures.get("head")
     lift = mannequin.lengths["stature"] - head[:, 1].max() if tape is None else tape.height - scale * LEVELS["head"][0]
     # The top of the mannequin's neck, and the model's nape at that height.
-    surface = mannequin.surface()
-    neck = max(
-        (surface.vertices[loop] for loop in border_loops(surface.faces)), key=lambda ring: float(ring[:, 1].mean())
-    )
+    neck = mannequin.line("collar")
     nape = neck[neck[:, 2].argmin()]
     behind = mean[np.abs(scale * mean[:, 1] + lift - nape[1]) < 0.01 * scale, 2].min()
     vertices = head + np.array([0.0, lift, nape[2] - scale * behind])

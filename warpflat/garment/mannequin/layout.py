@@ -15,6 +15,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,14 +23,28 @@ from numpy.typing import NDArray
 from warpflat.core import InputError, IntArray, short_repr
 from warpflat.flat import grid_quads, half_edges
 
-__all__ = ["ARM_LEVELS", "LEG_LEVELS", "LEG_LINES", "QUARTERS", "RING_LEVELS", "Layout", "joined_runs", "make_layout"]
-
+__all__ = [
+    "ARM_LEVELS",
+    "EASED_LEVELS",
+    "LEG_LEVELS",
+    "LEG_LINES",
+    "QUARTERS",
+    "RING_LEVELS",
+    "TRUNK_RINGS",
+    "Layout",
+    "joined_runs",
+    "make_layout",
+]
 
 #: Closed horizontal levels, bottom up.
 RING_LEVELS = ("ankle", "knee", "thigh", "hip", "abdomen", "waist", "underbust", "bust")
+#: Those of the trunk.
+TRUNK_RINGS = RING_LEVELS[RING_LEVELS.index("hip") :]
 ARM_LEVELS = ("armhole", "biceps", "elbow", "forearm", "wrist")
 #: Closed levels of one leg from the top down; the first is half of the hip's row and the crotch curve.
 LEG_LEVELS = ("crotch", "leg_thigh", "leg_knee", "leg_calf", "leg_ankle")
+#: Closed levels that may have ease: all but armhole and crotch curve, and the across-chest row.
+EASED_LEVELS = (*RING_LEVELS, "chest", *ARM_LEVELS[1:], *LEG_LEVELS[1:])
 #: The line of a leg's level, less its side.
 LEG_LINES = {level: level.removeprefix("leg_") for level in LEG_LEVELS[1:]}
 #: In the order in which a ring runs: from centre front over the body's left to the back.
@@ -85,7 +100,7 @@ class Strips:
     leg_row: Mapping[str, int]
     vertex_count: int
 
-    @property
+    @cached_property
     def mirror(self) -> IntArray:
         """#V, the mirror image of each vertex at the midplane."""
         out = np.full(self.vertex_count, -1, np.int32)

@@ -14,7 +14,7 @@ from warpflat.core import FloatArray, InputError, nearest, polyline_length, shor
 from warpflat.flat import Surface
 from warpflat.garment.mannequin.bricks import Brick, brick, select_bricks
 from warpflat.garment.mannequin.builder import build_trunk, build_vertices
-from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LINES, RING_LEVELS, Layout, make_layout
+from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LINES, RING_LEVELS, TRUNK_RINGS, Layout, make_layout
 from warpflat.garment.mannequin.measurements import Measurements, measurements_from_size, measurements_from_values
 from warpflat.garment.mannequin.nearest_size import SizeDifference, difference_to_size, nearest_size
 from warpflat.garment.mannequin.profiles import convex_girth
@@ -27,10 +27,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Level", "Mannequin"]
 
+# So often chest and back are set and measured.
 _ROUNDS = 6
-
-
-_TRUNK_LEVELS = ("bust", "underbust", "waist", "abdomen", "hip")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -193,7 +191,7 @@ class Mannequin:
                 height=float(points[0, 1]),
                 girth=convex_girth(points),
                 # Below the hip a section is of two legs, and a skirt's profile goes around both.
-                section=self.sections.get(name) if name in _TRUNK_LEVELS else None,
+                section=self.sections.get(name) if name in TRUNK_RINGS else None,
             )
         for side in ("left", "right"):
             for level in ARM_LEVELS:

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import functools
-import importlib.resources
 import math
 import re
-import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from importlib import resources
 from typing import Any
 
 import numpy as np
 
-from warpflat.core import InputError, expect, is_number, nearest
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from warpflat.core import InputError, expect, is_number, nearest, read_toml
 
 __all__ = [
+    "BELOW_CROTCH",
+    "TAKEN_ALONG",
     "Measurements",
     "measurements_from_size",
     "measurements_from_values",
@@ -30,6 +26,14 @@ __all__ = [
 ]
 
 
+#: By measurement where it is taken on a body: a line, or a head, hand or foot.
+TAKEN_ALONG = {
+    "head": "head", "neck": "neck", "shoulder": "shoulder left", "bust": "bust", "underbust": "underbust",
+    "chest_width": "chest front", "back_width": "chest back", "waist": "waist", "abdomen": "abdomen", "hip": "hip",
+    "thigh": "thigh", "knee": "knee", "ankle": "ankle", "upper_arm": "biceps left", "elbow": "elbow left", "wrist": "wrist left",
+    "hand": "hand left", "arm_length": "overarm left", "inside_leg": "inseam left", "thigh_girth": "thigh left",
+    "knee_girth": "knee left", "calf_girth": "calf left", "ankle_girth": "ankle left", "foot": "foot left",
+}  # fmt: skip
 #: What measurements are called elsewhere.
 _OTHER_NAMES = {
     "height": "stature", "body_height": "stature", "chest": "bust", "hips": "hip", "seat": "hip", "inseam": "inside_leg",
@@ -38,6 +42,8 @@ _OTHER_NAMES = {
 }  # fmt: skip
 #: A body of a lower stature [m] is completed as a child's: one woman in a hundred is not as tall.
 _GROWN = 1.46
+#: The thigh's tape lies so far below the crotch, as a share of the stature: nearer sections hold a part of the seat.
+BELOW_CROTCH = 0.03
 #: How far the stature [cm] of a size for short and for tall people lies from the table's, as in the sizes of the German trade.
 _STATURES = {"petite": -8.0, "tall": 8.0}
 
@@ -64,10 +70,8 @@ class Measurements:
 @functools.cache
 def size_tables() -> dict[str, Any]:
     """Return the contents of ``data/sizes.toml``: size tables, completion rules, cross-sections, valid ranges."""
-    text = (
-        importlib.resources.files("warpflat.garment.mannequin").joinpath("data/sizes.toml").read_text(encoding="utf-8")
-    )
-    return tomllib.loads(text)
+    with resources.as_file(resources.files("warpflat.garment.mannequin") / "data/sizes.toml") as path:
+        return read_toml(path)
 
 
 def size_names() -> list[str]:
@@ -324,7 +328,7 @@ class _Completion:
         h["hip"] = min(h["hip"], h["waist"] - min(0.11, 0.095 * stature))
         # The crotch curve needs room below the hip, the rows above the thigh's girth below the crotch.
         h["crotch"] = min(lengths["inside_leg"], h["hip"] - 0.02 * stature)
-        h["leg_thigh"] = h["crotch"] - 0.03 * stature
+        h["leg_thigh"] = h["crotch"] - BELOW_CROTCH * stature
         h["leg_knee"], h["leg_calf"], h["leg_ankle"] = h["knee"], 0.205 * stature, h["ankle"]
         h["thigh"] = min(h["thigh"], h["hip"] - 0.05)
         h["underbust"] = h["bust"] - 0.40 * (h["bust"] - h["waist"])

@@ -5,29 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from warpflat.core import without_side
 from warpflat.garment.mannequin.layout import LEG_LINES, RING_LEVELS
-from warpflat.garment.mannequin.measurements import Measurements, measurements_from_size, size_tables
+from warpflat.garment.mannequin.measurements import TAKEN_ALONG, Measurements, measurements_from_size, size_tables
 
 __all__ = ["SizeDifference", "difference_to_size", "nearest_size"]
 
 _SIZED_BY = ("bust", "waist", "hip")
-# The measurement that a line of the mannequin is, by the line's name without its side.
-_MEASUREMENT = {
-    **{level: level for level in RING_LEVELS},
-    "neck": "neck",
-    "shoulder": "shoulder",
-    "chest front": "chest_width",
-    "chest back": "back_width",
-    "biceps": "upper_arm",
-    "elbow": "elbow",
-    "wrist": "wrist",
-    "head": "head",
-    "hand": "hand",
-    "foot": "foot",
-    "hip, legs together": "hip",
-}
-_OF_ONE_LEG = {f"{line} {side}": f"{line}_girth" for line in LEG_LINES.values() for side in ("left", "right")}
+# The measurement that a line of the mannequin, or a tape, is; of a pair that on the left.
+_MEASUREMENT = {line: name for name, line in TAKEN_ALONG.items()} | {"hip, legs together": "hip"}
 # The height of a size that a line lies at.
 _HEIGHT = {
     **{level: level for level in RING_LEVELS},
@@ -76,7 +61,7 @@ def difference_to_size(name: str, heights: Mapping[str, float], girths: Mapping[
         girths: the same [m].
     """
     size = measurements_from_size(name)
-    measured = {line: _OF_ONE_LEG.get(line, _MEASUREMENT.get(without_side(line))) for line in girths}
+    measured = {line: _MEASUREMENT.get(line.replace(" right", " left")) for line in girths}
     return SizeDifference(
         size=name,
         heights={k: heights[k] - size.heights[_HEIGHT[k]] for k in girths if k in _HEIGHT},

@@ -18,6 +18,7 @@ from warpflat.core import (
     arc_lengths,
     nearest_on_polyline,
     points_at_lengths,
+    polyline_length,
     unit,
 )
 from warpflat.flat import vertex_normals
@@ -81,13 +82,9 @@ class Neckline:
         Args:
             layout, vertices: of the body or form (#V by 3 [m]) whose lines they are shares of.
         """
-        side = np.mean([arc_lengths(vertices[layout.yokes[f"front-{each}"][-1]])[-1] for each in ("left", "right")])
-        # Down the patch, and on along the rings to the bust.
-        rings = layout.rings[layout.level_row["bust"] :]
-        front, back = (
-            arc_lengths(vertices[np.concatenate([row[:0:-1, row.shape[1] // 2], rings[::-1, column]])])[-1]
-            for row, column in ((layout.front, 0), (layout.back, rings.shape[1] // 2))
-        )
+        side = np.mean([polyline_length(vertices[layout.lines[f"shoulder {each}"]]) for each in ("left", "right")])
+        below = layout.level_row["bust"]
+        front, back = (polyline_length(vertices[line[: len(line) - below]]) for line in _centres(layout).values())
         return Neckline(
             side_cm=self.side_cm + self.side_share * 100.0 * float(side),
             front_cm=self.front_cm + self.front_share * 100.0 * float(front),
@@ -110,14 +107,7 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
     quads = layout.faces[np.isin(layout.faces, ids).all(axis=1)]
     surface = _Surface(vertices, quads)
     neckline = neckline.in_cm(layout, vertices)
-    seams = [layout.yokes[f"front-{side}"][-1] for side in ("left", "right")]
-    seams = [seam if seam[0] in layout.neck[0] else seam[::-1] for seam in seams]
-    # From the neck down to the ankle.
-    around = layout.rings.shape[1] // 2
-    centres = {
-        face: np.concatenate([patch[:0:-1, patch.shape[1] // 2], layout.rings[::-1, column]])
-        for face, patch, column in (("front", layout.front, 0), ("back", layout.back, around))
-    }
+    seams, centres = [layout.lines[f"shoulder {side}"] for side in ("left", "right")], _centres(layout)
     out = _with_neckline(layout, vertices, neckline, quads, seams, centres)
     fixed = [layout.neck[0], *seams, layout.rings[layout.level_row["bust"]], *(arm[0] for arm in layout.arms.values())]
     moved = np.setdiff1d(ids, np.concatenate(fixed))
@@ -156,6 +146,11 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
     if fewest > few and is_deep:
         raise InputError("neckline: the cloth folds below it; make it less deep: a smaller front_cm or back_cm")
     return best
+
+
+def _centres(layout: Layout) -> dict[str, IntArray]:
+    """Return the centre lines in front and behind, from the base of the neck down to the ankle."""
+    return {face: layout.lines[f"centre {face}"][-len(layout.neck) :: -1] for face in ("front", "back")}
 
 
 def _with_neckline(

@@ -11,11 +11,11 @@ from warpflat.core import FloatArray, InputError, IntArray, nearest, other_side
 from warpflat.flat import join_labels
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.darts import FormDart, place_darts
-from warpflat.garment.mannequin.forms import Form, FormResult, PieceRecipe
+from warpflat.garment.mannequin.forms import Form, PieceRecipe
 from warpflat.garment.mannequin.halves import is_side
 from warpflat.garment.mannequin.layout import Layout
 
-__all__ = ["part_pieces", "princess_seams", "taken_over"]
+__all__ = ["part_pieces", "part_recipe", "princess_seams", "taken_over"]
 
 
 def part_pieces(layout: Layout, vertices: FloatArray, form: Form, seams: Sequence[FormDart]) -> Form:
@@ -78,20 +78,20 @@ def taken_over(layout: Layout, vertices: FloatArray, form: Form, seams: Sequence
     return gone
 
 
-def princess_seams(form: FormResult, piece: str) -> list[FormDart]:
-    """Return the cuts along whole princess lines that part a piece of a form on both sides of the body."""
+def princess_seams(layout: Layout, bricks: Sequence[str], piece: str) -> list[FormDart]:
+    """Return the cuts along whole princess lines that part a piece of these bricks, both sides of the body."""
     lines = [f"princess {face} left" for face in ("front", "back")]
     return [
         FormDart(name="princess seam", piece=piece, line=line, part=(0.0, 1.0))
         for line in lines
-        if len(set(_labels(form.layout, form.bricks[piece], [line, other_side(line)]).tolist())) > 1
+        if len(set(_labels(layout, bricks, [line, other_side(line)]).tolist())) > 1
     ]
 
 
 def _parts(
     layout: Layout, vertices: FloatArray, name: str, recipe: PieceRecipe, lines: Sequence[str]
 ) -> dict[str, PieceRecipe]:
-    """Return the parts of a piece, named by where they lie.
+    """Return the parts of a piece, named by where they lie, those of the centre first.
 
     Raises:
         InputError: the lines do not part it.
@@ -108,8 +108,15 @@ def _parts(
     sides = [
         next((side for side in ("left", "right") if all(is_side(brick, side) for brick in part)), "") for part in groups
     ]
-    centre = "" in sides and any(sides)
-    across = [("side_" + side if centre else side) if side else ("centre" if centre else "") for side in sides]
+    columns = ["centre" if all(brick.endswith("-centre") for brick in part) else "side" for part in groups]
+    if len(set(columns)) == 1 or not any(sides):
+        columns = [("side" if side else "centre") if "" in sides and any(sides) else "" for side in sides]
+    across = [
+        column
+        if column == "centre" and columns.count("centre") == 1
+        else "_".join(word for word in (column, side) if word)
+        for column, side in zip(columns, sides, strict=True)
+    ]
     heights = [float(np.mean([vertices[layout.bricks[brick], 1].mean() for brick in part])) for part in groups]
     names = []
     for number, word in enumerate(across):
@@ -117,12 +124,17 @@ def _parts(
         at = alike.index(number)
         place = "" if len(alike) == 1 else ("lower", "upper")[at] if len(alike) == 2 else f"{at + 1}"
         names.append("_".join(part for part in (word, place) if part))
-    for part, ending in zip(groups, names, strict=True):
-        bounds = layout.edges_of(part)
-        through = [line for line in (recipe.datum, *lines) if line and layout.edges_along(line) & bounds]
-        inner = [line for line in recipe.open if layout.edges_along(line) & bounds]
-        found[f"{name}_{ending}"] = PieceRecipe(bricks=tuple(part), datum=(through or [""])[0], open=tuple(inner))
+    for part, ending in sorted(zip(groups, names, strict=True), key=lambda each: not each[1].startswith("centre")):
+        found[f"{name}_{ending}"] = part_recipe(layout, recipe, part, lines)
     return found
+
+
+def part_recipe(layout: Layout, recipe: PieceRecipe, bricks: Sequence[str], lines: Sequence[str]) -> PieceRecipe:
+    """Return the recipe of a part of a piece: with its datum if that runs there, else the first of the lines that part it there."""
+    bounds, inside = layout.edges_of(bricks), layout.edges_of(bricks, inside=True)
+    through = [line for line in (recipe.datum, *lines) if line and layout.edges_along(line) & bounds]
+    opened = tuple(line for line in recipe.open if layout.edges_along(line) & inside)
+    return PieceRecipe(bricks=tuple(bricks), datum=(through or [""])[0], open=opened)
 
 
 def _labels(layout: Layout, bricks: Sequence[str], lines: Sequence[str]) -> IntArray:

@@ -11,7 +11,7 @@ import numpy as np
 from warpflat.core import FloatArray
 from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.closest import Mesh
-from warpflat.garment.mannequin.layout import LEG_LINES, RING_LEVELS
+from warpflat.garment.mannequin.layout import LEG_LINES, TRUNK_RINGS
 from warpflat.pattern import (
     INK,
     SIDES,
@@ -31,12 +31,14 @@ from warpflat.pattern import (
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.mannequin import Mannequin
 
-__all__ = ["signed_distances", "write_distance_picture", "write_mannequin_picture"]
+__all__ = ["LINE", "signed_distances", "write_distance_picture", "write_mannequin_picture"]
 
 # The side comes last: its names stand beyond it.
 _VIEWS = (("front", 0.0), ("three-quarter", 38.0), ("back", 180.0), ("left side", 90.0))
 _HEIGHT, _GAP, _NAMES = 8.0, 0.2, 1.8  # of the page, between views, and room for names [in]
-_LINE, _LEADER = "#9c1f30", (*INK, 0.65)
+#: Colour of lines on bodies.
+LINE = "#9c1f30"
+_LEADER = (*INK, 0.65)
 # A line is not drawn where it turns from the eye: there it slips along the outline.
 _FACING = 0.12
 # Ends of the scale of distances [mm]; what lies farther has the colour of the ends.
@@ -65,13 +67,12 @@ def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) 
             towards = vertex_normals(drawn.view.points, faces)[:, 2] > _FACING
             for ids in mannequin.layout.body_lines.values():
                 edges = np.column_stack([ids[:-1], ids[1:]])
-                drawn.draw_segments(edges[towards[edges].all(axis=1)], width=0.9, colour=_LINE)
+                drawn.draw_segments(edges[towards[edges].all(axis=1)], width=0.9, colour=LINE)
             if title != "left side":
                 _label_lines(pen, drawn, mannequin, title)
         # Names and girths [cm] of the profiles stand behind the side view, on short leaders, spread so that none overlap.
         levels, (_, bottom, right, top) = mannequin.levels(), drawn.box
-        trunk = RING_LEVELS[RING_LEVELS.index("hip") :]
-        names = ["neck", "chest back", *reversed(trunk), *(f"{line} left" for line in LEG_LINES.values())]
+        names = ["neck", "chest back", *reversed(TRUNK_RINGS), *(f"{line} left" for line in LEG_LINES.values())]
         lines = [drawn.to_page(drawn.view.points[mannequin.layout.lines[name]]) for name in names]
         ends = [line[int(np.argmax(line[:, 0]))] for line in lines]
         places = space_out([float(end[1]) for end in ends], 0.028 * (top - bottom), bottom, top)
@@ -99,7 +100,7 @@ def _label_lines(pen: Pen, drawn: DrawnView, mannequin: Mannequin, view: str) ->
             "rotation_mode": "anchor",
             "va": "bottom",
         }
-        pen.write(x - 0.03, y, name, 8, color=_LINE, **along)
+        pen.write(x - 0.03, y, name, 8, color=LINE, **along)
     if view != "three-quarter":
         return
     height = drawn.box[3] - drawn.box[1]

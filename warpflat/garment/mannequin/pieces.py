@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpflat.core import FloatArray, InputError, IntArray, find_unused_name, nearest, short_repr
-from warpflat.flat import Surface, border_edges, euler_characteristic, half_edges, join_labels
+from warpflat.flat import Surface, border_loops, euler_characteristic, fan_labels, half_edges, paired_half_edges
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.halves import check_halves, fold_among, is_side, lies_on_both
 from warpflat.garment.mannequin.layout import Layout, joined_runs
@@ -200,52 +199,30 @@ def _split(faces: IntArray, cut: set[tuple[int, int]]) -> tuple[IntArray, IntArr
 
     Two corners at one vertex are one vertex of the piece if a chain of faces joins them without crossing the cut.
     """
-    flat, count, he = faces.reshape(-1), faces.size, half_edges(faces)
-    # Sides of faces in the order of their edges, so that the two sides of one lie side by side.
-    order, place = np.argsort(he.edge, kind="stable"), np.cumsum(he.count) - he.count
-    closed = (he.count == 2) & [(a, b) not in cut for a, b in he.edges.tolist()]
-    one, other = order[place[closed]], order[place[closed] + 1]
-    crossed = he.tail[one] == he.head[other]
-    links = np.concatenate([
-        np.column_stack([one, np.where(crossed, he.next[other], other)]),
-        np.column_stack([he.next[one], np.where(crossed, other, he.next[other])]),
-    ])  # fmt: skip
-    label = join_labels(count, links[:, 0], links[:, 1])
+    he = half_edges(faces)
+    a, b = paired_half_edges(he)
+    whole = np.array([(low, high) not in cut for low, high in he.edges.tolist()])[he.edge[a]]
+    fan = fan_labels(he, a[whole], b[whole])
+    vertex = he.tail[np.unique(fan, return_index=True)[1]]
     # Numbered in the mannequin's order, so that a piece is the same in every size.
-    order = np.lexsort((np.arange(count), flat))
-    _, first = np.unique(label[order], return_index=True)
-    rank = np.empty(label.max() + 1, int)
-    rank[label[order][np.sort(first)]] = np.arange(label.max() + 1)
-    corners = rank[label].astype(np.int32)
-    grid_vertices = np.empty(label.max() + 1, np.int32)
-    grid_vertices[corners] = flat
-    return corners.reshape(-1, 4), grid_vertices
+    order = np.argsort(vertex, kind="stable")
+    number = np.empty(len(order), np.int32)
+    number[order] = np.arange(len(order))
+    return number[fan].reshape(-1, 4), vertex[order]
 
 
-def _borders(
-    corners: IntArray, name: str, *, opened: bool, darts: Collection[str]
-) -> tuple[NDArray[np.int64], list[NDArray[np.int64]]]:
+def _borders(corners: IntArray, name: str, *, opened: bool, darts: Collection[str]) -> tuple[IntArray, list[IntArray]]:
     """Return the border loop of a disk, counter-clockwise from outside, and those of its holes, clockwise.
 
     Raises:
         InputError: the faces are no disk, with or without holes.
     """
     sides = half_edges(corners)
-    border = border_edges(corners)
-    follow = dict(border.tolist())
-    if len(follow) != len(border) or not follow:
-        raise InputError(_not_one_disk(name, opened=opened, darts=darts))
-    loops: list[list[int]] = []
-    while follow:
-        start = min(follow)
-        loops.append([start])
-        while (ahead_of := follow.pop(loops[-1][-1])) != start:
-            loops[-1].append(ahead_of)
-    loops.sort(key=len, reverse=True)
+    loops = border_loops(sides)
     # By Euler: every further loop is a hole of the one disk.
-    if euler_characteristic(sides) != 2 - len(loops):
+    if not loops or euler_characteristic(sides) != 2 - len(loops):
         raise InputError(_not_one_disk(name, opened=opened, darts=darts))
-    return np.array(loops[0]), [np.array(loop) for loop in loops[1:]]
+    return loops[0], loops[1:]
 
 
 def _not_one_disk(name: str, *, opened: bool, darts: Collection[str]) -> str:
@@ -267,7 +244,7 @@ def _legs(dart: str) -> tuple[str, str]:
 
 def _edges(
     layout: Layout,
-    loop: NDArray[np.int64],
+    loop: IntArray,
     grid_vertices: IntArray,
     darts: Mapping[str, IntArray],
     continued: Mapping[str, str],

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpflat.core import FloatArray, InputError, resample
+from warpflat.garment.mannequin.sampled import smoothstep
 
 __all__ = ["Section", "convex_girth", "scale_to_girth", "section_curve", "superellipse_exponent", "upper_hull"]
 
@@ -58,7 +59,7 @@ def section_curve(section: Section, samples: int = 720) -> FloatArray:
     bump = sum(np.exp(-0.5 * ((x - at) / section.bump_width) ** 2) for at in (-section.bump_x, section.bump_x))
     # The bumps fade where the curve turns to the side, so that the side stays smooth and the width is kept.
     facing = np.clip(np.abs(radius * c), 0.0, 1.0)
-    fade = facing * facing * (3.0 - 2.0 * facing)
+    fade = smoothstep(facing)
     z = z + bump * fade * np.where(c > 0.0, section.front_bump, -section.back_bump) + section.shift
     return resample(np.column_stack([x, z]), np.arange(samples) / samples, closed=True)
 

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from warpflat.core import FloatArray, InputError
+from warpflat.garment.mannequin.sampled import smooth
 
-__all__ = ["ray_radii", "row_at", "smooth_radii", "with_harmonics"]
+__all__ = ["ray_radii", "smooth_radii", "with_harmonics"]
 
 # Sampled hulls are smoothed so far from row to row [rows].
 _UP_SIGMA = 1.5
@@ -58,15 +59,6 @@ def smooth_radii(
         count: of rays.
         harmonics: that are kept.
     """
-    from scipy.ndimage import gaussian_filter1d
-
     rows = zip(hulls, middles, heights.tolist(), strict=True)
     radii = np.stack([ray_radii(hull, middle, count, height) for hull, middle, height in rows])
-    return with_harmonics(gaussian_filter1d(radii, _UP_SIGMA, axis=0, mode="nearest"), harmonics)
-
-
-def row_at(values: FloatArray, heights: FloatArray, height: float) -> FloatArray:
-    """Return what rows of values (#S by ...) at rising heights (#S [m]) are at a height between them."""
-    at = float(np.clip(np.interp(height, heights, np.arange(len(heights))), 0.0, len(heights) - 1.001))
-    i, f = int(at), at - int(at)
-    return np.asarray((1.0 - f) * values[i] + f * values[i + 1])
+    return with_harmonics(smooth(radii, _UP_SIGMA), harmonics)

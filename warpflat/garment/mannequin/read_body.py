@@ -15,7 +15,7 @@ from warpflat.garment.mannequin.body_landmarks import LEVELS
 from warpflat.garment.mannequin.scan_levels import ScanLevel, find_levels
 from warpflat.garment.mannequin.scan_pose import LEVELS_UP, ScanOptions, turn_scan_upright
 from warpflat.garment.mannequin.scan_sections import BodySections
-from warpflat.garment.mannequin.slicer import UP, Slicer
+from warpflat.garment.mannequin.slicer import UP, Slicer, largest
 from warpflat.garment.mannequin.stand_body import StandingBody, stand_body
 
 __all__ = ["ReadBody", "read_body", "whole_sections"]
@@ -142,7 +142,8 @@ def _crotch_height(scan: Slicer, laid: StandingBody) -> float:
     vertex, size = float(laid.posed[laid.crotch, 1]), float(laid.posed[:, 1].max())
     for y in np.arange(vertex - 0.010 * size, vertex + 0.012 * size, 0.001):
         parts = scan.cut(UP, float(y))
-        largest = max((p.points for p in parts), key=lambda p: float(np.ptp(p[:, 0]) * np.ptp(p[:, 2])), default=None)
-        if largest is not None and largest[:, 0].min() < -0.02 * size and largest[:, 0].max() > 0.02 * size:
-            return float(y)
+        if parts:
+            across = largest(parts).points[:, 0]
+            if across.min() < -0.02 * size and across.max() > 0.02 * size:
+                return float(y)
     return vertex

@@ -8,15 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import FloatArray, arc_lengths
+from warpflat.core import AXES, FloatArray, arc_lengths, reflected
 from warpflat.flat import vertex_normals
 from warpflat.garment.mannequin.blueprint import Blueprint, Profile
 from warpflat.garment.mannequin.builder import build_vertices
 from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.layout import RING_LEVELS, Layout
 from warpflat.garment.mannequin.profiles import convex_girth, scale_to_girth, upper_hull
-from warpflat.garment.mannequin.rays import row_at, smooth_radii
+from warpflat.garment.mannequin.rays import smooth_radii
 from warpflat.garment.mannequin.read_body import read_body, whole_sections
+from warpflat.garment.mannequin.sampled import row_at, smooth, smoothstep
+from warpflat.garment.mannequin.scan_levels import BUST_POINTS
 from warpflat.garment.mannequin.scan_limbs import leg_curves, underarm_point, upper_curves
 from warpflat.garment.mannequin.scan_measures import body_measures, guess_note, missing_note
 from warpflat.garment.mannequin.scan_pose import ScanOptions
@@ -81,29 +83,28 @@ def attributes_on_scan(
 def _profiles(
     body: BodySections, levels: Mapping[str, float], underarms: Mapping[str, FloatArray]
 ) -> Callable[[float], Profile]:
-    from scipy.ndimage import gaussian_filter1d
-
     t = body.trunk
     rows = np.flatnonzero(t.y < levels["armpit"] - 0.002)
     count = 720
     middle_z = 0.5 * (t.front + t.back)[rows]
     # A row's rays start from a point that climbs smoothly, or the rows would be twisted against each other.
-    start = gaussian_filter1d(middle_z, 3.0, mode="nearest")
+    start = smooth(middle_z, 3.0)
     y, girth = t.y[rows], t.girth[rows]
     middles = np.column_stack([np.zeros_like(start), start])
     radii = smooth_radii([t.hulls[i] for i in rows], middles, y, count, _HARMONICS)
     # A side seam hangs nearly plumb: halfway between the middle of front and back and the straight line from hip to underarm,
     # and on that line from the bust up, so that it meets the armhole squarely.
-    side_z = gaussian_filter1d(middle_z, 14.0, mode="nearest")
+    side_z = smooth(middle_z, 14.0)
     _, under_y, under_z = 0.5 * (underarms["left"] + underarms["right"])
     hip, waist, bust = levels["hip"], levels["waist"], levels["bust"]
     straight = np.interp(y, [hip, under_y], [np.interp(hip, y, side_z), under_z])
     off = np.clip((bust - y) / (bust - waist), 0.0, 1.0)
-    side_z += (1.0 - _OFF_PLUMB * off * off * (3.0 - 2.0 * off)) * (y > hip) * (straight - side_z)
+    side_z += (1.0 - _OFF_PLUMB * smoothstep(off)) * (y > hip) * (straight - side_z)
     rays = np.arange(count) * 2.0 * np.pi / count
     outward = np.column_stack([np.sin(rays), np.cos(rays)])
     bust_girth = float(np.interp(levels["bust"], y, girth))
-    apex = float(np.clip(np.interp(levels["bust"], t.y, t.apex), 0.085 * bust_girth, 0.125 * bust_girth))
+    least, most = BUST_POINTS
+    apex = float(np.clip(np.interp(levels["bust"], t.y, t.apex), least * bust_girth, most * bust_girth))
     known = [levels[level] for level in RING_LEVELS]
     widths = np.array([PRINCESS[level] for level in RING_LEVELS]) * apex
 
@@ -117,7 +118,7 @@ def _profiles(
         around = np.vstack([curve, curve[:1]])
         front_x, back_x = (float(np.interp(height, known, widths[:, k])) for k in (0, 1))
         return Profile(
-            curve=curve, centre_front=0.0, side_left=_where(curve[:, 1], s, left, z), centre_back=float(s[half]),
+            curve=curve, side_left=_where(curve[:, 1], s, left, z), centre_back=float(s[half]),
             side_right=_where(curve[:, 1], s, right, z), girth=float(row_at(girth, y, height)),
             princess={
                 "front-left": _share(curve[: left + 1], front_x),
@@ -178,7 +179,7 @@ def _attractor(body: BodySections, levels: Mapping[str, float]) -> Callable[[Flo
         at = place[:, [1, 0]]
         share = np.clip((levels["front_neck"] - place[:, 1]) / (levels["front_neck"] - levels["bust"]), 0.0, 1.0)
         # Towards the armholes the bridge fades out.
-        share = share * share * (3.0 - 2.0 * share) * np.clip((1.0 - np.abs(place[:, 0]) / reach) / 0.1, 0.0, 1.0)
+        share = smoothstep(share) * np.clip((1.0 - np.abs(place[:, 0]) / reach) / 0.1, 0.0, 1.0)
         ahead, behind = front(at), back(at)
         is_front = place[:, 2] > 0.5 * (ahead + behind)
         bridge = np.where(is_front, np.maximum(ahead - place[:, 2], 0.0), np.minimum(behind - place[:, 2], 0.0))
@@ -234,4 +235,4 @@ def sides_note(vertices: FloatArray, layout: Layout, *, averaged: bool) -> tuple
 
 
 def _mirror_image(vertices: FloatArray, layout: Layout) -> FloatArray:
-    return vertices[layout.mirror] * np.array([-1.0, 1.0, 1.0])
+    return reflected(vertices[layout.mirror], AXES["+x"])

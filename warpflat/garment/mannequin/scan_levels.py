@@ -10,13 +10,14 @@ import numpy as np
 
 from warpflat.core import FloatArray, InputError
 from warpflat.garment.mannequin.body_landmarks import height_of, near_level
+from warpflat.garment.mannequin.measurements import BELOW_CROTCH
+from warpflat.garment.mannequin.sampled import smooth, stretch, summit
 from warpflat.garment.mannequin.scan_pose import LEVELS_UP
-from warpflat.garment.mannequin.scan_sections import OUTLINES, BodySections, smooth
+from warpflat.garment.mannequin.scan_sections import OUTLINES, BodySections
 from warpflat.garment.mannequin.slicer import UP
 from warpflat.garment.mannequin.stand_body import StandingBody
-from warpflat.garment.mannequin.summit import summit
 
-__all__ = ["ALIKE", "ISO_HEIGHT", "NOISE", "TRUNK", "ScanLevel", "find_levels", "stretch", "unsure_of"]
+__all__ = ["ALIKE", "BUST_POINTS", "ISO_HEIGHT", "NOISE", "TRUNK", "ScanLevel", "find_levels", "unsure_of"]
 
 #: Levels of the trunk around which a tape is laid, from the top down.
 TRUNK = ("bust", "underbust", "waist", "hip")
@@ -27,8 +28,10 @@ ALIKE, NOISE, ISO_HEIGHT = 0.001, 0.5, 0.004
 _NO_FOLD = "no fold shows under the bust"
 # So far up and down from its landmark the extreme of a level lies, as a share of the stature.
 _REACH = {"bust": 0.020, "waist": 0.036, "hip": 0.030, "calf": 0.016, "ankle": 0.013}
-# Bust points lie so far off the midplane, as shares of the bust's girth; a fold under the bust is followed at this one.
-_BUST_POINTS, _BUST_POINT = np.linspace(0.085, 0.125, 9), 0.1
+#: Bust points lie so far off the midplane, as shares of the bust's girth.
+BUST_POINTS = 0.085, 0.125
+# A fold under the bust is followed at this one.
+_BUST_POINT = 0.1
 # A fold bends the outline by so much over a way of one stature, and by so much under a bust that stands out. It lies so far below its
 # landmark at most, and so far above it, as shares of the stature.
 _FOLD, _SURE_FOLD, _FOLD_BELOW, _FOLD_ABOVE = 14.0, 45.0, 0.05, 0.01
@@ -44,8 +47,6 @@ _CREASE, _KNEE_SURE = 0.03, 0.004
 _BELOW_UNDERBUST = 0.023
 # How far below the armpits the bust may lie at most, as a share of the stature: the rows above it need this room.
 _BELOW_ARMPIT = 0.006
-# The thigh's tape lies so far below the crotch, as a share of the stature: nearer sections hold a part of the seat.
-_BELOW_CROTCH = 0.03
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +82,7 @@ def find_levels(
         found[f"leg_{name}"] = ScanLevel(height=0.5 * (sides[0].height + sides[1].height), guess=guess)
         if name != "calf":
             found[name] = found[f"leg_{name}"]
-    found["leg_thigh"] = ScanLevel(height=body.crotch - _BELOW_CROTCH * size)
+    found["leg_thigh"] = ScanLevel(height=body.crotch - BELOW_CROTCH * size)
     hip = given.get("hip", found["hip"].height)
     found["thigh"] = ScanLevel(height=min(0.44 * size, body.crotch - 0.01 * size, hip - 0.05 * size))
     for name, height in given.items():
@@ -89,7 +90,7 @@ def find_levels(
         for level in (name, f"leg_{name}" if name != "thigh" else name):
             if level in found:
                 found[level] = ScanLevel(height=height)
-    for under, over in itertools.pairwise(LEVELS_UP):
+    for under, over in itertools.pairwise(name for name in LEVELS_UP if name in found):
         if found[over].height - found[under].height < 0.004 * size:
             raise InputError(
                 f"scan: {over} ({found[over].height:.3f} m) does not lie above {under} ({found[under].height:.3f} m); "
@@ -142,7 +143,7 @@ def _trunk_levels(body: BodySections, noise: float, given: Mapping[str, float]) 
     found["waist"] = _least(body, "waist", t.y, smooth(t.girth, sigma), noise, lacking, below=below)
     # Bust points are the bust's most prominent places.
     bust = height_of("bust", body.vertices)
-    points = _BUST_POINTS * float(np.interp(bust, t.y, t.girth)) / size
+    points = np.linspace(*BUST_POINTS, 9) * float(np.interp(bust, t.y, t.girth)) / size
     ahead = smooth(np.array([np.interp(points, OUTLINES, row).max() for row in t.outlines]), sigma)
     shown = _least(body, "bust", t.y, -ahead, noise, "no bust stands out", below=armpit - _BELOW_ARMPIT * size)
     if found["underbust"].guess != _NO_FOLD:
@@ -224,10 +225,3 @@ def _noisy(noise: float) -> str:
 def unsure_of(noise: float) -> str | None:
     """Return why noise [m] makes a landmark a guess; None if it does not."""
     return _noisy(noise) if noise > _NOISE_SURE else None
-
-
-def stretch(rows: np.ndarray, row: int) -> slice:
-    """Return the stretch of true rows around `row`, which is true."""
-    off = np.flatnonzero(~rows)
-    before, after = off[off < row], off[off > row]
-    return slice(int(before[-1]) + 1 if len(before) else 0, int(after[0]) if len(after) else len(rows))

@@ -7,10 +7,11 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from warpflat.core import FloatArray, InputError, arc_lengths, polyline_length, resample, unit
-from warpflat.garment.mannequin.blueprint import NOTCH, ArmCurves, LegCurves, LegProfile, Profile, QuarterCurves
+from warpflat.garment.mannequin.blueprint import NOTCH, LegCurves, LegProfile, Profile, QuarterCurves
 from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.layout import LEG_LEVELS, QUARTERS
-from warpflat.garment.mannequin.rays import ray_radii, row_at, smooth_radii, with_harmonics
+from warpflat.garment.mannequin.rays import ray_radii, smooth_radii, with_harmonics
+from warpflat.garment.mannequin.sampled import row_at, smooth
 from warpflat.garment.mannequin.scan_sections import ArmSections, BodySections
 from warpflat.garment.mannequin.slicer import UP, Slicer
 from warpflat.garment.mannequin.table_legs import AROUND_LEG, crotch_curve, profile_of_curve
@@ -30,7 +31,7 @@ _HARMONICS = 5
 # A point of a section outside a window counts by so much less for each metre that it lies outside.
 _STEEP = 10.0
 # Where an arm is sliced between biceps (0), elbow (1) and wrist (2): forearms swell below the elbow.
-_ARM_PLACES = (0.5, 1.25, 1.5, 1.75)
+_ARM_PLACES = (0.0, 0.5, 1.0, 1.25, 1.5, 1.75, 2.0)
 # Harmonics around a leg that are kept.
 _LEG_HARMONICS = 16
 # The outseam lies in the middle of what is within so much [m] of the outermost, smoothed along the leg [rows].
@@ -44,7 +45,7 @@ def upper_curves(
     levels: Mapping[str, float],
     profile: Callable[[float], Profile],
     underarms: Mapping[str, FloatArray],
-) -> tuple[dict[str, QuarterCurves], dict[str, ArmCurves], FloatArray, float]:
+) -> tuple[dict[str, QuarterCurves], dict[str, dict[float, FloatArray]], FloatArray, float]:
     """Return the curves of the quarters above the bust, those of the arms, the collar (#P by 3 [m]), and the neck base's length [m].
 
     Args:
@@ -298,26 +299,23 @@ def _centre(slicer: Slicer, bottom: FloatArray, chest: FloatArray, top: FloatArr
     return np.column_stack([np.zeros_like(y), y, z])
 
 
-def _arm_curves(arm: ArmSections, hole: FloatArray) -> ArmCurves:
-    """Return the curves at biceps, elbow and wrist; they turn with the arm and are not wrung against the armhole `hole`."""
+def _arm_curves(arm: ArmSections, hole: FloatArray) -> dict[float, FloatArray]:
+    """Return the curves from biceps to wrist by their place; they turn with the arm and are not wrung against the armhole `hole`."""
     top = hole[int(np.argmax(hole[:, 1]))]
     axis = unit(arm.line[-1] - hole.mean(axis=0))
     beyond = max(float(point @ axis) for point in (hole[0], top)) + _SHORTEST_SLEEVE
     biceps = float(np.clip(np.interp(beyond, arm.line @ axis, arm.s), arm.s[4], arm.elbow - 0.10 * arm.s[-1]))
-    places = sorted({0.0, 1.0, 2.0, *_ARM_PLACES})
-    along = np.interp(places, [0.0, 1.0, 2.0], [biceps, arm.elbow, arm.wrist])
+    along = np.interp(_ARM_PLACES, [0.0, 1.0, 2.0], [biceps, arm.elbow, arm.wrist])
     # From the armhole's lowest to its highest point, carried along the arm without a twist.
     up = top - hole[0]
     side = np.sign(hole[0, 0])
     rings: dict[float, FloatArray] = {}
-    for place, s in zip(places, along, strict=True):
+    for place, s in zip(_ARM_PLACES, along, strict=True):
         at, across = arm.frame(float(s))
         up = unit(up - across * float(across @ up))
         cut = arm.cut(at, across)
         rings[place] = _loop(cut, cut.mean(axis=0), -up, side * np.cross(across, up), 4, 240)
-    return ArmCurves(
-        biceps=rings.pop(0.0), elbow=rings.pop(1.0), wrist=rings.pop(2.0), between=rings,
-    )  # fmt: skip
+    return rings
 
 
 def leg_curves(body: BodySections, levels: Mapping[str, float], hip: Profile) -> LegCurves:
@@ -351,7 +349,7 @@ def leg_curves(body: BodySections, levels: Mapping[str, float], hip: Profile) ->
         places = (outermost * curves[side][..., 1]).sum(axis=1) / outermost.sum(axis=1)
         foot = legs.y < levels["leg_ankle"]
         places[foot] = places[~foot][0]
-        outseams[side] = gaussian_filter1d(places, _OUTSEAM_SIGMA, mode="nearest")
+        outseams[side] = smooth(places, _OUTSEAM_SIGMA)
 
     def profile(side: str, height: float) -> LegProfile:
         curve = row_at(curves[side], legs.y, height)

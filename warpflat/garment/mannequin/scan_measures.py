@@ -13,19 +13,18 @@ from warpflat.garment.mannequin.body_model import finer_body
 from warpflat.garment.mannequin.measurements import size_tables
 from warpflat.garment.mannequin.profiles import convex_girth
 from warpflat.garment.mannequin.read_body import ReadBody
+from warpflat.garment.mannequin.sampled import smooth, stretch, summit
 from warpflat.garment.mannequin.scan_levels import (
     ALIKE,
     ISO_HEIGHT,
     NOISE,
     TRUNK,
     ScanLevel,
-    stretch,
     unsure_of,
 )
-from warpflat.garment.mannequin.scan_sections import BodySections, smooth, tape_around
-from warpflat.garment.mannequin.slicer import UP, Slicer
+from warpflat.garment.mannequin.scan_sections import BodySections, tape_around
+from warpflat.garment.mannequin.slicer import UP, Slicer, largest
 from warpflat.garment.mannequin.stand_body import StandingBody
-from warpflat.garment.mannequin.summit import summit
 
 __all__ = ["ScanMeasure", "body_measures", "guess_note", "missing_note"]
 
@@ -164,8 +163,7 @@ def body_measures(read: ReadBody, neck: float, given: Mapping[str, float]) -> di
 
 def _around(vertices: FloatArray, height: float) -> float:
     """Return the girth [m] of the finer body model's trunk at a height [m]."""
-    parts = [p.points for p in Slicer(vertices, finer_body()[1]).cut(UP, height)]
-    return convex_girth(max((p[:, [0, 2]] for p in parts), key=lambda p: float(np.ptp(p[:, 0]))))
+    return convex_girth(largest(Slicer(vertices, finer_body()[1]).cut(UP, height)).points)
 
 
 def _is_possible(name: str, girth: float, stature: float) -> bool:
@@ -205,14 +203,13 @@ def _head(slicer: Slicer, stature: float) -> ScanMeasure | None:
         parts = [p for p in slicer.cut(UP, float(y)) if abs(p.points[:, 0].mean()) < 0.06 * stature]
         if not parts:
             return None
-        largest = max(parts, key=lambda p: float(np.ptp(p.points[:, 0]) * np.ptp(p.points[:, 2])))
-        part = largest.points[:, [0, 2]]
-        widths.append(float(np.ptp(part[:, 0])))
+        part = largest(parts)
+        widths.append(float(np.ptp(part.points[:, 0])))
         # Ears stand out of the head: below them its width leaps.
         if len(widths) > 12 and widths[-1] > 1.06 * max(widths[-5:-1]):
             break
-        girths.append(convex_girth(part))
-        holed.append(largest.is_holed)
+        girths.append(convex_girth(part.points))
+        holed.append(part.is_holed)
     values = smooth(np.array(girths), 1.0)
     row = int(np.argmax(values))
     if 0 < row < len(values) - 1:
@@ -236,8 +233,8 @@ def _fold_of_arm(body: BodySections, side: str) -> FloatArray:
         trunk = [p for p in parts if p[:, 0].min() < 0.0 < p[:, 0].max()]
         if not trunk:
             break
-        largest = max(trunk, key=lambda p: float(np.ptp(p[:, 0])))
-        edge = largest[np.argmax(sign * largest[:, 0])]
+        widest = max(trunk, key=lambda p: float(np.ptp(p[:, 0])))
+        edge = widest[np.argmax(sign * widest[:, 0])]
         if before is not None and sign * (edge - before)[0] > _LEAP_OF_ARM * size:
             return before
         before = edge
@@ -289,8 +286,8 @@ def _hand(scan: Slicer, body: BodySections, laid: StandingBody, side: str) -> Sc
         parts = [p for p in scan.cut(axis, float(at @ axis))
                  if np.linalg.norm(p.points.mean(axis=0) - at) < 0.6 * reach.max() and len(p.points) > 5]  # fmt: skip
         if parts:
-            largest = max(((tape_around(p.points, axis), p.is_holed) for p in parts), key=lambda each: each[0][1])
-            tapes.append((len(parts), *largest))
+            fullest = max(((tape_around(p.points, axis), p.is_holed) for p in parts), key=lambda each: each[0][1])
+            tapes.append((len(parts), *fullest))
     if not tapes:
         return None
     girths = np.array([tape[1] for _, tape, _ in tapes])

@@ -11,30 +11,19 @@ from numpy.typing import NDArray
 
 from warpflat.core import AXES, FloatArray, InputError, nearest, unit
 from warpflat.flat import METRES_PER_UNIT, join_labels, stray_vertex, stray_words
+from warpflat.garment.mannequin.layout import TRUNK_RINGS
+from warpflat.garment.mannequin.sampled import summit
 from warpflat.garment.mannequin.scan_repair import find_holes, smooth_noise, turned_outward
 from warpflat.garment.mannequin.slicer import UP, Slicer, plane_axes
-from warpflat.garment.mannequin.summit import summit
 
 __all__ = ["LANDMARKS", "LEVELS_UP", "ScanOptions", "across_trunk", "find_facing", "find_legs", "turn_scan_upright"]
 
 _UNITS = {name: METRES_PER_UNIT[name] for name in ("m", "dm", "cm", "mm", "in")}
 _STATURE = (0.9, 2.3)
-#: Levels of trunk and legs, from the floor up.
-LEVELS_UP = (
-    "ankle",
-    "knee",
-    "thigh",
-    "hip",
-    "abdomen",
-    "waist",
-    "underbust",
-    "bust",
-    "armpit",
-    "front_neck",
-    "side_neck",
-)
+#: Landmarks of legs and trunk, from the floor up.
+LEVELS_UP = ("ankle", "calf", "knee", "thigh", "crotch", *TRUNK_RINGS, "armpit", "front_neck", "side_neck")
 #: Landmarks whose heights a user may give.
-LANDMARKS = (*LEVELS_UP, "calf", "crotch", "wrist", "elbow")
+LANDMARKS = (*LEVELS_UP, "wrist", "elbow")
 # Pieces of so small a share of the faces are left out, if they are no more than so many together.
 _LOOSE, _LOOSE_TOGETHER = 0.01, 0.05
 # The trunk looks at most so far away from where the legs do [half degrees].

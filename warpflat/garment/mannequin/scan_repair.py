@@ -19,6 +19,7 @@ from warpflat.flat import (
     orient,
     vertex_normals,
 )
+from warpflat.garment.mannequin.sampled import neighbour_mean
 
 __all__ = ["find_holes", "smooth_noise", "turned_outward"]
 
@@ -104,15 +105,10 @@ def smooth_noise(points: FloatArray, triangles: NDArray[np.int64]) -> tuple[Floa
 
     Source: Taubin, "A signal processing approach to fair surface design", 1995.
     """
-    from scipy.sparse import coo_array
-
-    ends = mesh_edges(triangles)
-    both = np.concatenate([ends, ends[:, ::-1]])
-    size = len(points)
-    degree = np.bincount(both[:, 0], minlength=size).astype(float)
-    beside = np.linalg.norm(points[both[:, 0]] - points[both[:, 1]], axis=1)
-    distance = np.bincount(both[:, 0], beside, minlength=size) / degree
-    mean = coo_array((1.0 / degree[both[:, 0]], (both[:, 0], both[:, 1])), shape=(size, size)).tocsr()
+    mean = neighbour_mean(mesh_edges(triangles), len(points))
+    row, column = mean.nonzero()
+    beside = np.linalg.norm(points[row] - points[column], axis=1)
+    distance = np.bincount(row, beside * mean.data, minlength=len(points))
     # A curved skin stands off its neighbours' mean, too, but evenly: what differs from the neighbours is noise.
     off = ((points - mean @ points) * vertex_normals(points, triangles)).sum(axis=1)
     wavers = np.abs(off - mean @ off)

@@ -12,10 +12,11 @@ from warpflat.core import BoolArray, FloatArray, InputError, arc_lengths, unit
 from warpflat.garment.mannequin.body_landmarks import ARM_PLACES, model_places, near_place, value_at
 from warpflat.garment.mannequin.body_model import finer_body
 from warpflat.garment.mannequin.profiles import convex_girth
+from warpflat.garment.mannequin.sampled import smooth
 from warpflat.garment.mannequin.slicer import HOLED, UP, Slicer, plane_axes
 from warpflat.garment.mannequin.stand_body import StandingBody
 
-__all__ = ["OUTLINES", "ArmSections", "BodySections", "LegSections", "TrunkSections", "smooth", "tape_around"]
+__all__ = ["OUTLINES", "ArmSections", "BodySections", "LegSections", "TrunkSections", "tape_around"]
 
 #: Distances from the midplane at which the outline of the front is followed, as shares of the stature.
 OUTLINES = np.linspace(0.03, 0.08, 11)
@@ -23,12 +24,6 @@ OUTLINES = np.linspace(0.03, 0.08, 11)
 _BESIDE = 0.010
 # An arm is sliced at so many places between these distances from the elbow on the mean body [m].
 _ARM, _ARM_COUNT = (-0.125, 0.165), 37
-
-
-def smooth(values: FloatArray, sigma: float) -> FloatArray:
-    from scipy.ndimage import gaussian_filter1d
-
-    return np.asarray(gaussian_filter1d(values, sigma, mode="nearest"))
 
 
 def tape_around(points: FloatArray, across: FloatArray) -> tuple[float, float]:
@@ -235,8 +230,6 @@ class BodySections:
 
 
 def _ways(line: FloatArray) -> FloatArray:
-    from scipy.ndimage import gaussian_filter1d
-
-    way = np.gradient(gaussian_filter1d(line, 2.0, axis=0, mode="nearest"), axis=0)
+    way = np.gradient(smooth(line, 2.0), axis=0)
     way[:4] = way[4]
     return unit(way)

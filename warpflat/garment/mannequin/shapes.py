@@ -9,9 +9,9 @@ from warpflat.core import FloatArray
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.darts import standard_darts
 from warpflat.garment.mannequin.elbow_darts import elbow_darts
-from warpflat.garment.mannequin.forms import Form, PieceRecipe
-from warpflat.garment.mannequin.halves import is_side
+from warpflat.garment.mannequin.forms import Form
 from warpflat.garment.mannequin.layout import Layout
+from warpflat.garment.mannequin.part_pieces import part_pieces, princess_seams
 
 __all__ = ["shaped_form"]
 
@@ -23,7 +23,7 @@ def shaped_form(
     layout: Layout,
     form: Form,
     shape: Literal["none", "darts", "princess"],
-    vertices: FloatArray | None = None,
+    vertices: FloatArray,
     *,
     woven: bool = True,
 ) -> Form:
@@ -36,14 +36,14 @@ def shaped_form(
         layout: the grid.
         form: the form.
         shape: ``none``, ``darts`` or ``princess``.
-        vertices: the body's, #V by 3 [m], which say whether its elbows are bent; without them none is.
+        vertices: the body's, #V by 3 [m].
         woven: whether the cloth is woven; a knit gives at the elbow.
 
     Raises:
         InputError: an unknown brick.
     """
     bricks = {name: select_bricks(layout, recipe.bricks) for name, recipe in form.pieces.items()}
-    if woven and vertices is not None:
+    if woven:
         form = replace(form, darts=(*form.darts, *elbow_darts(layout, bricks, vertices)))
     if shape == "none":
         return form
@@ -58,25 +58,12 @@ def shaped_form(
             ruled=(*form.ruled, *ruled),
             bridged=(*form.bridged, *bridged),
         )
-    pieces: dict[str, PieceRecipe] = {}
-    for name, recipe in form.pieces.items():
-        pieces |= _parted(name, recipe, bricks[name])
-    return replace(form, pieces=pieces)
-
-
-def _parted(name: str, recipe: PieceRecipe, bricks: list[str]) -> dict[str, PieceRecipe]:
-    """Part a piece along the princess lines; one that none of them runs through stays."""
-    centre = [b for b in bricks if b.endswith("-centre")]
-    parts = {f"{name}_centre": (centre, recipe.datum)}
-    for side in ("left", "right"):
-        at_side = [b for b in bricks if b.endswith("-side") and is_side(b, side)]
-        faces = {b.partition("/")[2].split("-")[0] for b in at_side}
-        if len(faces) == 1:
-            parts[f"{name}_side_{side}"] = (at_side, f"princess {faces.pop()} {side}")
-    if not centre or sum(len(chosen) for chosen, _ in parts.values()) != len(bricks) or len(parts) == 1:
-        return {name: recipe}
-    return {
-        part: replace(recipe, bricks=tuple(chosen), datum=datum, open=recipe.open if chosen is centre else ())
-        for part, (chosen, datum) in parts.items()
-        if chosen
-    }
+    # A piece of front and back, or with a sleeve in one, stays whole.
+    seams = [
+        seam
+        for name, chosen in bricks.items()
+        if all(brick.endswith(("-centre", "-side")) for brick in chosen)
+        and len(found := princess_seams(layout, chosen, name)) == 1
+        for seam in found
+    ]
+    return part_pieces(layout, vertices, form, seams)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warpflat.core import FloatArray, IntArray
 from warpflat.garment.mannequin.layout import LEG_LEVELS, Layout
+from warpflat.garment.mannequin.sampled import neighbour_mean
 
 __all__ = ["fill_fork", "fill_sheet", "sheet_laplacian"]
 
@@ -107,8 +108,4 @@ def _umbrella(layout: Layout, grids: list[IntArray]) -> tuple[IntArray, Any, NDA
     ids = np.unique(edges)
     local = np.full(layout.vertex_count, -1)
     local[ids] = np.arange(len(ids))
-    a, b = local[edges].T
-    n = len(ids)
-    adjacency = sparse.coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), (n, n)).tocsr()
-    degree = np.asarray(adjacency.sum(axis=1)).ravel()
-    return ids, (sparse.diags(1.0 / degree) @ adjacency - sparse.identity(n)).tocsr(), local
+    return ids, (neighbour_mean(local[edges], len(ids)) - sparse.identity(len(ids))).tocsr(), local

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core import FloatArray, unit
+from warpflat.flat import half_edges
 
-__all__ = ["HOLED", "UP", "Slice", "Slicer", "plane_axes"]
+__all__ = ["HOLED", "UP", "Slice", "Slicer", "largest", "plane_axes"]
 
 #: A section runs over a hole if more than this share of it lies on what the scan does not show.
 HOLED = 0.1
 #: Across level planes.
 UP = np.array([0.0, 1.0, 0.0])
+
+
+def largest(parts: Sequence[Slice]) -> Slice:
+    """Return the part of a level section with the largest box around it: the trunk's, the head's or both legs'."""
+    return max(parts, key=lambda part: float(np.ptp(part.points[:, [0, 2]], axis=0).prod()))
 
 
 def plane_axes(normal: FloatArray) -> FloatArray:
@@ -60,11 +67,8 @@ class Slicer:
         self.noise = noise
         #: Triangles from this one on close holes.
         self.scanned = len(triangles) if scanned is None else scanned
-        ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], -1).reshape(-1, 2)
-        ends = np.sort(ends, axis=1).astype(np.int64)
-        keys, inverse = np.unique(ends[:, 0] * len(vertices) + ends[:, 1], return_inverse=True)
-        self.edges = np.column_stack([keys // len(vertices), keys % len(vertices)])
-        self.face_edges = np.ravel(inverse).reshape(-1, 3)
+        he = half_edges(triangles)
+        self.edges, self.face_edges = he.edges, he.edge.reshape(-1, 3)
         self.vertices = vertices
         self.triangles = triangles
         self._corners = np.ascontiguousarray(triangles.T)

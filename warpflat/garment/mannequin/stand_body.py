@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from warpflat.core import BoolArray, FloatArray
-from warpflat.flat import vertex_normals
+from warpflat.flat import mesh_edges, vertex_normals
 from warpflat.garment.mannequin.body_landmarks import LEVELS, crotch_vertex, meeting, model_places, near_level, value_at
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation, rotation_vector
 from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.fit_body import FittedBody, fit_body
+from warpflat.garment.mannequin.sampled import neighbour_mean, smooth
 
 __all__ = ["StandingBody", "lay_on_scan", "stand_body"]
 
@@ -137,14 +138,10 @@ class StandingBody:
 @lru_cache(maxsize=1)
 def _bending() -> csr_array:
     """Return the matrix of the squared second differences over the finer body's edges."""
-    from scipy.sparse import coo_array, diags_array
+    from scipy.sparse import diags_array
 
     matrix, triangles = finer_body()
-    n = matrix.shape[0]
-    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
-    both = np.unique(np.concatenate([ends, ends[:, ::-1]]), axis=0)
-    near = coo_array((np.ones(len(both)), both.T), shape=(n, n)).tocsr()
-    even = diags_array(np.ones(n)) - diags_array(1.0 / np.maximum(near.sum(axis=1), 1.0)) @ near
+    even = diags_array(np.ones(matrix.shape[0])) - neighbour_mean(mesh_edges(triangles), matrix.shape[0])
     stiff = np.where(matrix @ BodyModel.load().detail > 0.5, _DETAIL, 1.0)
     return (even.T @ diags_array(stiff) @ even).tocsr()
 
@@ -162,11 +159,7 @@ def lay_on_scan(start: FloatArray, mesh: Mesh) -> tuple[FloatArray, BoolArray]:
     finer, triangles = finer_body()
     bending, points, seen = _bending(), start, np.zeros(len(start), dtype=bool)
     model = BodyModel.load()
-    weights = finer @ model.weights
-    arms, near = (
-        weights[:, [i for i, name in enumerate(model.joints) if name.split(".")[0] in names]].sum(axis=1)
-        for names in (("upperarm01",), ("spine03", "clavicle"))
-    )
+    arms, near = (finer @ model.share_of(*names) for names in (("upperarm01",), ("spine03", "clavicle")))
     # Scanners and cloth span webs between arms and trunk.
     nearer = 1.0 - _WEB * np.minimum(1.0, 4.0 * arms * near)
     for stiffness, far_at_most in _STAGES:
@@ -242,8 +235,6 @@ def _arms_hanging(model: BodyModel, person: Person) -> tuple[Person, float]:
 
 
 def _stand(fit: FittedBody, vertices: FloatArray, triangles: NDArray[np.int64], as_scanned: bool) -> StandingBody:
-    from scipy.ndimage import gaussian_filter1d
-
     model, (finer, faces), places = BodyModel.load(), finer_body(), model_places()
     mesh = Mesh(vertices, triangles)
     posed, seen = lay_on_scan(finer @ model.vertices(fit.person), mesh)
@@ -304,7 +295,7 @@ def _stand(fit: FittedBody, vertices: FloatArray, triangles: NDArray[np.int64], 
             bands = [places.strips[f"leg {side}"] & (which == band) for band in range(1, len(bins))]
             heights = np.array([y[band].mean() for band in bands])
             room = np.array([x[band].min() for band in bands]) - _BETWEEN
-            inwards = gaussian_filter1d(np.minimum(apart * (hip - heights), room), 1.0, mode="nearest")
+            inwards = smooth(np.minimum(apart * (hip - heights), room), 1.0)
             inwards = np.minimum(inwards, room)
             # From the crotch up flesh follows less and less, and in proportion to its distance from the midplane.
             rows = (places.mean[:, 1] < 0.56) & (sign * places.mean[:, 0] > 0.0) & ~places.strips[f"arm {side}"]
@@ -368,7 +359,7 @@ def _unsure(
     part = np.argmax(weights, axis=1)
     triangles = finer_body()[1]
     size = np.bincount(triangles.ravel(), np.repeat(Mesh(standing, triangles).area, 3), len(standing))
-    plain = finer_body()[0] @ BodyModel.load().detail < 0.5
+    plain = model_places().plain
     for number, name in enumerate(names):
         which = (part == number) & (plain | (name == "neck01"))
         shown = _PARTS.get(name.split(".")[0])

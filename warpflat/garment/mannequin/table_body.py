@@ -5,11 +5,12 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, arc_lengths, polyline_length, resample, unit
-from warpflat.garment.mannequin.blueprint import NOTCH, ArmCurves, Blueprint, Profile, QuarterCurves, mirrored
+from warpflat.core import AXES, FloatArray, InputError, arc_lengths, polyline_length, reflected, resample, unit
+from warpflat.garment.mannequin.blueprint import NOTCH, Blueprint, Profile, QuarterCurves
 from warpflat.garment.mannequin.layout import QUARTERS, RING_LEVELS
 from warpflat.garment.mannequin.measurements import Measurements, size_tables
 from warpflat.garment.mannequin.profiles import Section, section_curve
@@ -118,7 +119,7 @@ def _profiles(m: Measurements) -> Callable[[float], Profile]:
             np.interp(back_x, curve[half : half // 2 : -1, 0], s[half] - s[half : half // 2 : -1]) / (s[half] - side)
         )
         return Profile(
-            curve=curve, centre_front=0.0, side_left=side, centre_back=float(s[half]), side_right=float(s[-1] - side),
+            curve=curve, side_left=side, centre_back=float(s[half]), side_right=float(s[-1] - side),
             girth=float(g),
             princess={"front-left": ahead, "back-left": behind, "back-right": behind, "front-right": ahead},
         )  # fmt: skip
@@ -167,7 +168,10 @@ def _quarters(m: Measurements, profile: Callable[[float], Profile]) -> dict[str,
             chest=chest[face], centre=spline(np.linspace(0.0, polyline_length(centre), 100)),
         )  # fmt: skip
         curves[f"{face}-left"] = left
-        curves[f"{face}-right"] = mirrored(left)
+        flipped: dict[str, Any] = {
+            name: reflected(line, AXES["+x"]) for name, line in vars(left).items() if name != "notch"
+        }
+        curves[f"{face}-right"] = replace(left, **flipped)
     return {name: curves[name] for name in QUARTERS}
 
 
@@ -239,8 +243,8 @@ def _neckline(m: Measurements) -> FloatArray:
     return loop(float(width))
 
 
-def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, ArmCurves]:
-    """Return both arms, which hang a little away from the body."""
+def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, dict[float, FloatArray]]:
+    """Return the curves around both arms, which hang a little away from the body."""
     front, back = quarters["front-left"].armhole, quarters["back-left"].armhole
     middle = np.vstack([front, back]).mean(axis=0)
     tip, under = front[0], front[-1]
@@ -263,9 +267,9 @@ def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, A
 
     elbow_at, under_at = start + 0.575 * length, float((under - middle) @ axis)
     biceps_at = under_at + min(_SHORTEST_SLEEVE, _SHORT_SHARE * length, _TO_ELBOW * (elbow_at - under_at))
-    left = ArmCurves(
-        biceps=ring(biceps_at, m.lengths["upper_arm"], 1.06, 0.0) + 0.006 * up,
-        elbow=ring(elbow_at, m.lengths["elbow"], 1.0, 0.004),
-        wrist=ring(start + length, m.lengths["wrist"], 1.15, 0.030),
-    )
-    return {"left": left, "right": mirrored(left)}
+    left = {
+        0.0: ring(biceps_at, m.lengths["upper_arm"], 1.06, 0.0) + 0.006 * up,
+        1.0: ring(elbow_at, m.lengths["elbow"], 1.0, 0.004),
+        2.0: ring(start + length, m.lengths["wrist"], 1.15, 0.030),
+    }
+    return {"left": left, "right": {place: reflected(curve, AXES["+x"]) for place, curve in left.items()}}

@@ -23,8 +23,8 @@ _AREA = 0.80
 AROUND_LEG = 240
 # Room [m] between the legs' insides and the midplane, and between their outsides and the tube around both.
 _BETWEEN, _INSIDE = 0.002, 0.001
-# The crotch curve is a superellipse of this exponent. The crotch point divides its length as front and back fork do.
-_BEND, _POINT = 2.0, 0.38
+# The crotch point divides the length of the crotch curve as front and back fork do.
+_POINT = 0.38
 # How far the inseam runs ahead of the leg's innermost points below the thigh, as a share of the girth.
 _INSEAM_AHEAD = 0.02
 # How much wider than the mean the columns next to the inseam are at the thigh.
@@ -88,27 +88,20 @@ def profile_of_curve(curve: FloatArray, girth: float, spread: float, outseam_z: 
     outside = slice(int(np.argmax(curve[:, 1])), int(np.argmin(curve[:, 1])) + 1)
     outseam = float(np.interp(-outseam_z, -curve[outside, 1], s[:-1][outside]) / s[-1])
     return LegProfile(
-        curve=curve,
-        crease_front=0.5 * outseam,
-        outseam=outseam,
-        crease_back=0.5 * (1.0 + outseam),
-        girth=girth,
-        spread=_SPREAD * spread,
-    )
+        curve=curve, outseam=outseam, girth=girth, spread=_SPREAD * spread,
+    )  # fmt: skip
 
 
 def crotch_curve(hip: float, crotch: float, front: float, back: float) -> FloatArray:
-    """Return the curve under the body from centre front to centre back, #P by 3 [m].
+    """Return the curve under the body from centre front to centre back, half an ellipse, #P by 3 [m].
 
     Args:
         hip, crotch: heights [m] of its ends and of its lowest point.
         front, back: z [m] of its ends.
     """
     t = np.linspace(0.0, np.pi, 200)
-    c, s = np.cos(t), np.sin(t)
-    radius = (np.abs(c) ** _BEND + np.abs(s) ** _BEND) ** (-1.0 / _BEND)
-    z = 0.5 * (front + back) + 0.5 * (front - back) * radius * c
-    return np.column_stack([np.zeros_like(t), hip - (hip - crotch) * radius * s, z])
+    z = 0.5 * (front + back) + 0.5 * (front - back) * np.cos(t)
+    return np.column_stack([np.zeros_like(t), hip - (hip - crotch) * np.sin(t), z])
 
 
 def _depth(width: float, girth: float) -> float:

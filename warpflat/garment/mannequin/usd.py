@@ -9,6 +9,7 @@ import numpy as np
 
 from warpflat.flat import vertex_normals
 from warpflat.pattern import (
+    SKIN,
     begin_stage,
     bounding_box,
     define_group,
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 __all__ = ["write_mannequin_usd"]
 
 _WIDTH = 0.0015
-_CLOTH = (0.80, 0.76, 0.68)
 _LINE = (0.55, 0.05, 0.10)
 
 
@@ -71,7 +71,7 @@ def _mesh(stage: Any, mannequin: Mannequin, part: str, *, on_body: bool) -> None
     layout = mannequin.layout
     chosen = layout.on_body == on_body
     corners, face_brick = layout.faces[chosen], layout.face_brick[chosen]
-    mesh = define_mesh(stage, f"/World/mannequin/{part}", corners, mannequin.vertices, _CLOTH)
+    mesh = define_mesh(stage, f"/World/mannequin/{part}", corners, mannequin.vertices, SKIN)
     if not on_body:
         mesh.CreatePurposeAttr(UsdGeom.Tokens.guide)
     normals = vertex_normals(mannequin.vertices, corners).astype(np.float32)
