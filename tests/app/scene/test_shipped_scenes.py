@@ -310,7 +310,7 @@ def _assert_every_printed_word_is_german(drafted: DraftedGarment) -> None:
         finished_lengths(garment, size)
         for piece in garment.pieces[size]:
             draw_piece(piece)
-            cutting_words(piece.piece)
+            cutting_words(piece.piece, piece.piece.quantity)
     assert words.missed - {""} == set()
 
 

@@ -51,7 +51,7 @@ def ball(pieces: list[Piece]) -> Pattern:
 def test_gores_that_are_equal_are_cut_from_one_and_all_their_seams_are_told() -> None:
     pattern, notes = draw_equal_pieces_once(ball([gore(k, 0.3 * k, 6e-4 * (k % 2)) for k in range(6)]))
     (piece,) = pattern.pieces[""]
-    assert (piece.name, piece.quantity, cutting_words(piece)) == ("piece_0", 6, "Cut 6")
+    assert (piece.name, piece.quantity, cutting_words(piece, piece.quantity)) == ("piece_0", 6, "Cut 6")
     assert notes == (
         "piece_0: cut 6 times, it serves for piece_1, piece_2, piece_3, piece_4, piece_5 too; they are averaged, which moves their "
         "outlines by at most 0.3 mm",
@@ -99,7 +99,7 @@ def test_pieces_that_are_mirror_images_are_cut_turned_over() -> None:
         Pattern(name="bag", pieces={"": pieces}, seams=[Seam(name="centre", sides=sides)])
     )
     (piece,) = pattern.pieces[""]
-    assert cutting_words(piece) == "Cut 2, 1 mirrored"
+    assert cutting_words(piece, piece.quantity) == "Cut 2, 1 mirrored"
     assert pattern.seams[0].sides == (
         (SeamSide(piece="piece_0", edge="e3"),), (SeamSide(piece="piece_0", edge="e3", mirrored=True),),
     )  # fmt: skip
