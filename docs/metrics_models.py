@@ -278,7 +278,9 @@ class Seam(Entry):
     name: str
     sides: list[str]
     length_mm: list[float]
+    """Of its two sides as they are cut: one that ends at a cuff, a band or an opening is without it."""
     length_3d_mm: float
+    """Of the whole seam on the form."""
     difference_mm: float
     ease: float
     """How much longer the second side is meant to be, as a share."""
