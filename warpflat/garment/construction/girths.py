@@ -46,7 +46,7 @@ def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping
     found = []
     for level, girth in pattern_girths(mannequin, form, positions).items():
         if "ease_wanted_m" in girth:
-            edges = piece_edges.along(*([_row(layout, level)] if level in RING_LEVELS else limbs[level]))
+            edges = piece_edges.cut_along(*([_row(layout, level)] if level in RING_LEVELS else limbs[level]))
             found.append(
                 _kept(level, edges, (girth["body_m"] + girth["ease_wanted_m"]) / girth["pattern_m"], positions)
             )
@@ -106,7 +106,7 @@ def pattern_girths(
 
     for level in reversed(RING_LEVELS):
         row = _row(layout, level)
-        edges = piece_edges.along(row)
+        edges = piece_edges.cut_along(row)
         if edges is not None:
             measure(level, row, edges, convex_girth)
             if level in form.ease:
@@ -118,7 +118,7 @@ def pattern_girths(
     spans = [sorted(map(limbs.index, pair)) for pair in form.recipe.ruled if set(pair) <= set(limbs)]
     for (name, _), row, _, axis in body_rows(mannequin):
         limb = without_side(name)
-        edges = piece_edges.along(row, axis) if limb != name else None
+        edges = piece_edges.cut_along(row, axis) if limb != name else None
         if edges is None:
             continue
 

@@ -77,7 +77,7 @@ class PieceEdges:
         """Return the edges of pieces along a closed row; None where the pieces do not go all around.
 
         The right half of a half piece is its left one. Where the row slopes on the form, as at the bust under a lowered
-        armhole, each of its edges counts by the share of it that is level, as tapes are level; those of a hem count whole.
+        armhole, each of its edges counts by the share of it that is level, as tapes are level.
 
         Args:
             row: vertices of the grid, the first not repeated.
@@ -93,8 +93,6 @@ class PieceEdges:
             return None
         first = np.searchsorted(self._sorted, keys)
         is_hem = bool((copies == 1).all() and self._border[first].all())
-        if is_hem:
-            level_share[:] = 1.0
         column = np.repeat(np.arange(len(keys)), copies)
         at = np.repeat(first, copies) + np.arange(len(column)) - np.repeat(np.cumsum(copies) - copies, copies)
         share = (level_share / copies)[column]
@@ -106,6 +104,11 @@ class PieceEdges:
             shares={name: share[chosen] for name, chosen in of.items()},
             is_hem=is_hem,
         )
+
+    def cut_along(self, row: IntArray, axis: FloatArray = UP) -> RowEdges | None:
+        """Return the edges of pieces along a closed row, as :meth:`along`, but those of a hem whole: it is as long as it is cut."""
+        edges = self.along(row, axis)
+        return self.along(row, ALONG) if edges is not None and edges.is_hem else edges
 
     def _copies(self, keys: IntArray) -> IntArray:
         """Return how many edges of pieces lie on each edge of the grid."""
