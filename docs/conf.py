@@ -13,7 +13,8 @@ from docutils.nodes import SkipNode  # noqa: E402
 from latex2mathml.converter import convert  # noqa: E402
 from sphinx.util.inspect import TypeAliasForwardRef  # noqa: E402
 
-import warpflat  # noqa: E402
+# Autodoc writes annotations of its own into the tables that it documents; models that are made of them afterwards would be refused.
+import warpflat.app.scene.schema  # noqa: E402
 
 project = "warpflat"
 version = release = warpflat.__version__

@@ -247,4 +247,4 @@ def test_the_command_line_takes_the_gap_and_warns_of_an_overlap(tmp_path: Path, 
     assert metrics["contact_energy_j"] > 0.0
     assert (tmp_path / "out" / "strip.dxf").exists()
     assert main([*bare, "--gap", "-1"]) == 2
-    assert "--gap = -1.0 is out of range" in capfd.readouterr().err
+    assert "--gap = -1.0; must be a number between 0 and 1000" in capfd.readouterr().err
