@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 __all__ = ["garment_files", "surface_files"]
 
-# A seam that is shorter in the pattern than as it was flattened by more than this [mm] ends at a cuff, a band or an opening.
+# A seam that is shorter in the pattern than as it was flattened by more than this [mm] ends at a cuff, a band or an opening: a drawn curve
+# and its mesh differ by less.
 _SHORTER = 1.0
 
 

@@ -7,7 +7,7 @@ from scipy.sparse import csr_array
 
 from warpflat.core import BoolArray, FloatArray, IntArray
 
-__all__ = ["neighbour_mean", "row_at", "smooth", "smoothstep", "stretch", "summit"]
+__all__ = ["neighbour_mean", "row_at", "rows_around", "smooth", "smoothstep", "summit"]
 
 
 def smooth(values: FloatArray, sigma: float) -> FloatArray:
@@ -38,8 +38,8 @@ def summit(y: FloatArray, values: FloatArray, row: int) -> float:
     return float(y[row] + np.clip(0.5 * (a - c) / bend, -1.0, 1.0) * (y[row + 1] - y[row]))
 
 
-def stretch(rows: BoolArray, row: int) -> slice:
-    """Return the stretch of true rows around `row`, which is true."""
+def rows_around(rows: BoolArray, row: int) -> slice:
+    """Return the unbroken rows around `row` that are true, as it is."""
     off = np.flatnonzero(~rows)
     before, after = off[off < row], off[off > row]
     return slice(int(before[-1]) + 1 if len(before) else 0, int(after[0]) if len(after) else len(rows))

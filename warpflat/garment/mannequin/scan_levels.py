@@ -11,7 +11,7 @@ import numpy as np
 from warpflat.core import FloatArray, InputError
 from warpflat.garment.mannequin.body_landmarks import height_of, near_level
 from warpflat.garment.mannequin.measurements import BELOW_CROTCH
-from warpflat.garment.mannequin.sampled import smooth, stretch, summit
+from warpflat.garment.mannequin.sampled import rows_around, smooth, summit
 from warpflat.garment.mannequin.scan_pose import LEVELS_UP
 from warpflat.garment.mannequin.scan_sections import OUTLINES, BodySections
 from warpflat.garment.mannequin.slicer import UP
@@ -120,7 +120,7 @@ def _least(
     row = int(rows[np.argmin(values[rows])]) if len(rows) else 0
     if len(rows) < 3 or not rows[0] < row < rows[-1]:
         return ScanLevel(height=min(at, below), guess=f"{lacking}; it is where the body model has it")
-    alike = y[stretch(values < values[row] + NOISE * noise, row)]
+    alike = y[rows_around(values < values[row] + NOISE * noise, row)]
     moved = noise > 0.0 and float(np.abs(alike - y[row]).max()) > ISO_HEIGHT
     return ScanLevel(height=summit(y, values, row), guess=_noisy(noise) if moved else None)
 

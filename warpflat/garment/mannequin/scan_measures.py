@@ -13,7 +13,7 @@ from warpflat.garment.mannequin.body_model import finer_body
 from warpflat.garment.mannequin.measurements import size_tables
 from warpflat.garment.mannequin.profiles import convex_girth
 from warpflat.garment.mannequin.read_body import ReadBody
-from warpflat.garment.mannequin.sampled import smooth, stretch, summit
+from warpflat.garment.mannequin.sampled import rows_around, smooth, summit
 from warpflat.garment.mannequin.scan_levels import (
     ALIKE,
     ISO_HEIGHT,
@@ -262,7 +262,7 @@ def _biceps(body: BodySections, side: str, noise: float) -> ScanMeasure:
     bellies = bellies[girths[bellies] > _BELLY * girths.max()]
     row = int(bellies[np.argmax(girths[bellies])]) if len(bellies) else int(np.argmax(girths))
     heights = np.array([height for height, _ in tapes])
-    alike = heights[stretch(girths > girths[row] - max(ALIKE, NOISE * noise), row)]
+    alike = heights[rows_around(girths > girths[row] - max(ALIKE, NOISE * noise), row)]
     guess = (
         "the arm is as full a way up and down from there" if np.abs(alike - heights[row]).max() > ISO_HEIGHT else None
     )

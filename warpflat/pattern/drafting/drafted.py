@@ -244,7 +244,7 @@ class Notch:
 
     @property
     def slits(self) -> list[FloatArray]:
-        """What is cut, 2 by 2 [m] each, from the cut line inwards."""
+        """The slits that are cut, 2 by 2 [m] each, from the cut line inwards."""
         return [np.stack([base, base + self.depth * self.direction]) for base in self.base]
 
 

@@ -120,7 +120,7 @@ class Piece:
 
     @property
     def pleats(self) -> int:
-        """How many knife pleats are laid in it, each at a line on which it is folded."""
+        """The number of knife pleats laid in it, each at a line on which it is folded."""
         return sum(name.startswith("pleat fold") for name in self.internal_lines)
 
     @property
