@@ -88,7 +88,7 @@ _TIMES = "seconds", "memory_mb"
 # Files that bear no name: in a folder with several runs they are taken to be the last one's.
 _NAMELESS = (
     "frames.usdc", "picture.png", "wear.png", "drape.png", "drape.webp", "corrected.png", "walked.png", "pattern.pdf", "pattern.json",
-    "review.html", "film.webp", "contact_sheet.png", "worn.usdc",
+    "review.html", "film.webp", "contact_sheet.png", "worn.usdc", "mannequin.usdc",
 )  # fmt: skip
 
 
@@ -137,7 +137,7 @@ class _Run:
         self.expected.update(names)
         _refuse_to_replace((self.folder / name for name in names), self.sources)
         if self.is_guarded and "metrics.json" in names:
-            _require_own_metrics(self.folder)
+            _require_own(self.folder)
 
     def protect(self, source: Path) -> None:
         """A file has been read."""
@@ -647,9 +647,15 @@ def notes_left_out(folder: Path) -> dict[str, list[str]]:
 
 
 def remove_stale(
-    folder: Path, metrics: Mapping[str, Any], *, name: str, files: Sequence[str], drape: bool = False
+    folder: Path,
+    metrics: Mapping[str, Any],
+    *,
+    name: str,
+    files: Sequence[str],
+    drape: bool = False,
+    report: str = "metrics.json",
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Write `metrics.json` at the end of a run, and remove files of earlier runs that could be taken for its own.
+    """Write the report of a run at its end, and remove files of earlier runs that could be taken for its own.
 
     That is what a run of the same name has written and this one has not, and of other runs those files that bear no name,
     such as `pattern.json`; never a file from which this run was made, nor one that is not as it was written. In an
@@ -657,20 +663,21 @@ def remove_stale(
 
     Args:
         folder: in which the run has written all else.
-        metrics: all of `metrics.json` but `files`.
+        metrics: all of the report but `files`.
         name: of the run.
         files: that it has written, by name.
         drape: whether garments are draped, of which earlier ones are removed, and nothing else.
+        report: the file's name.
 
     Returns:
-        What `metrics.json` holds, and what was left out, removed or left, one sentence each.
+        What the report holds, and what was left out, removed or left, one sentence each.
 
     Raises:
-        InputError: `metrics.json` cannot be written.
+        InputError: the report cannot be written.
     """
     going_on = _run_into(folder)
     removed, notes = list[tuple[str, str]](), list[str]()
-    for run, known in recorded_files(_require_own_metrics(folder)).items():
+    for run, known in recorded_files(_require_own(folder, report)).items():
         for file, was in known.items():
             is_stale = file.endswith(".draped.obj") and run == name if drape else run == name or file in _NAMELESS
             if file in files or not is_stale:
@@ -694,7 +701,7 @@ def remove_stale(
     if removed:
         names = ", ".join(file for _, file in removed)
         notes.insert(0, f"removed what an earlier run had left and this one did not make: {names}")
-    complete = write_report(folder / "metrics.json", metrics, name=name, files=files, gone=removed)
+    complete = write_report(folder / report, metrics, name=name, files=files, gone=removed)
     left_out = () if going_on is None else dict.fromkeys(step.note for step in going_on.left_out)
     return complete, (*left_out, *notes)
 
@@ -706,7 +713,7 @@ def record_file(folder: Path, name: str, file: str) -> None:
         InputError: `metrics.json` cannot be written.
     """
     try:
-        metrics = _require_own_metrics(folder)
+        metrics = _require_own(folder)
     except InputError:
         return  # somebody else's, which knows of no run
     record = recorded_files(metrics)
@@ -719,13 +726,13 @@ def record_file(folder: Path, name: str, file: str) -> None:
         write(folder / "metrics.json", {**metrics, "files": record})
 
 
-def _require_own_metrics(folder: Path) -> dict[str, Any]:
-    """Check that the `metrics.json` of a folder is of warpflat, since a run replaces it; return its content, empty if there is none.
+def _require_own(folder: Path, report: str = "metrics.json") -> dict[str, Any]:
+    """Check that a report in a folder is of warpflat, since a run replaces it; return its content, empty if there is none.
 
     Raises:
         InputError: it is something else by that name.
     """
-    file = folder / "metrics.json"
+    file = folder / report
     latest = latest_file(file)
     if not os.path.lexists(latest):
         return {}

@@ -69,7 +69,7 @@ def test_stiffness_shows_as_the_cloth_has_it(comparison: Comparison):
 
 
 def test_files_and_table(comparison: Comparison, tmp_path: Path):
-    assert save_comparison(comparison, tmp_path) == ["compare.json", "compare.png", "compare.svg"]
+    assert save_comparison(comparison, tmp_path) == (["compare.json", "compare.png", "compare.svg"], ())
     data = json.loads((tmp_path / "compare.json").read_text())
     assert data["compared_with"] == "denim"
     assert set(data["fabrics"]["jersey"]["front"]) >= {"area_m2", "border_lengths_m", "model_energy_j", "wear"}
@@ -234,7 +234,8 @@ def test_each_cloth_is_draped_on_demand(tmp_path: Path):
     path.write_text(text)
     comparison = compare_fabrics(load_scene(path), ["woven", "denim"], drape=True)
     assert list(comparison.drapes) == ["woven", "denim"]
-    assert save_comparison(comparison, tmp_path / "out")[-1] == "compare-drape.png"
+    files, notes = save_comparison(comparison, tmp_path / "out")
+    assert (files[-1], notes) == ("compare-drape.png", ())
     assert (tmp_path / "out" / "compare-drape.png").stat().st_size > 10_000
     found = json.loads((tmp_path / "out" / "compare.json").read_text())["drapes"]
     assert found["denim"]["steps"] <= 200
@@ -243,3 +244,7 @@ def test_each_cloth_is_draped_on_demand(tmp_path: Path):
     worn = table[table.index("\nworn") :]
     assert f"{1e3 * found['denim']['misfit_m']['max']:.1f}" in worn
     assert "pressure, mean [Pa]" in worn
+    # The picture of an earlier comparison is not taken for one of this.
+    files, notes = save_comparison(replace(comparison, drapes={}), tmp_path / "out")
+    assert sorted(files) == sorted(file.name for file in (tmp_path / "out").iterdir())
+    assert notes == ("removed what an earlier run had left and this one did not make: compare-drape.png",)

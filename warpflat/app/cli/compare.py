@@ -54,7 +54,7 @@ def compare(scene: Path, fabrics: tuple[str, ...], drape: bool, output: Output) 
         comparison = compare_fabrics(
             job, fabrics, on_progress=lambda _, progress: bar(progress), device=output.device, drape=drape
         )
-        files = save_comparison(comparison, folder)
+        files, notes = save_comparison(comparison, folder)
     warnings = [
         f"{fabric}: {line}"
         for fabric, pieces in comparison.results.items()
@@ -66,7 +66,8 @@ def compare(scene: Path, fabrics: tuple[str, ...], drape: bool, output: Output) 
             }
         )
     ]
-    for warning in warnings:
-        tell(warning)
+    told = [f"note: {note}" for note in (*comparison.notes, *notes)] if output.tells else []
+    for line in (*told, *warnings):
+        tell(line)
     output.report(folder / "compare.json", lambda: [comparison_table(comparison), f"{folder}: {', '.join(files)}"])
     return FAULTY if warnings else DONE

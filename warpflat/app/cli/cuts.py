@@ -86,6 +86,8 @@ def cuts(
             data = made.as_dict()
             _write_toml(folder, "The scene's cuts and seams after the edit, instead of its own.", [made.as_toml()])
             write_report(folder / "edit.json", data, name="edit", files=["cuts.toml"])
+        for note in made.notes if output.tells else ():
+            tell(f"note: {note}")
         output.report(
             folder / "edit.json", lambda: [f"{edit_table(data)}\n\n{made.as_toml()}\n{folder}: edit.json, cuts.toml"]
         )

@@ -166,7 +166,9 @@ def fit(
         fitted.append(Fitted(carried=one, folder=to, metrics=result.metrics))
         if output.tells:
             click.echo(fitted[-1].verdict())
-    written = write_study(folder, fitted)
+    written, notes = write_study(folder, fitted)
+    for note in notes if output.tells else ():
+        tell(f"note: {note}")
     output.report(
         folder / "fit.json",
         lambda: [*([study_table(fitted)] if len(fitted) > 1 else ()), f"fit: {folder}: {', '.join(written)}"],

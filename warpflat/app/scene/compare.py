@@ -45,7 +45,7 @@ def compare_fabrics(
             f"{len(fabrics)} fabric given to compare; name two or more, such as --fabric denim --fabric jersey"
         )
     # In the scene's own fabric, so that all patterns have the same darts.
-    scene, _ = settle_shape(scene, device=device)
+    scene, notes = settle_shape(scene, device=device)
     called, known = dict[str, str](), dict[str, str]()
     for name in fabrics:
         fabric = scene_fabric(_in_fabric(scene, name))
@@ -65,7 +65,7 @@ def compare_fabrics(
         require_open_darts(one, made.values())
         return made
 
-    scene, garments, _ = with_open_darts(scene, in_each)
+    scene, garments, closed = with_open_darts(scene, in_each)
     results = {name: {part: advise(flat) for part, flat in garment.parts.items()} for name, garment in garments.items()}
     first = next(iter(results.values()))
     layouts = {
@@ -76,7 +76,14 @@ def compare_fabrics(
     drapes = {
         name: drape_scene(_in_fabric(scene, called[name]), garments[name], device=device) for name in garments if drape
     }
-    return Comparison(name=scene.name, results=results, layouts=layouts, sewing=sewing, drapes=drapes)
+    return Comparison(
+        name=scene.name,
+        results=results,
+        layouts=layouts,
+        sewing=sewing,
+        drapes=drapes,
+        notes=(*notes, *closed),
+    )
 
 
 def _in_fabric(scene: Scene, name: str) -> Scene:
@@ -88,14 +95,17 @@ def compared_files(*, drape: bool) -> list[str]:
     return ["compare.json", "compare.png", "compare.svg", *(["compare-drape.png"] if drape else [])]
 
 
-def save_comparison(comparison: Comparison, folder: str | Path) -> list[str]:
+def save_comparison(comparison: Comparison, folder: str | Path) -> tuple[list[str], tuple[str, ...]]:
     """Write `compare.json`, `compare.png` and `compare.svg` (outlines in true size), all of them or none.
+
+    Returns:
+        The names of the files, and what became of those of an earlier comparison, one sentence each.
 
     Raises:
         InputError: the folder cannot be written, or a surface was read from a file there that would be replaced.
     """
     from warpflat.app.scene.compare_picture import write_overlay_picture, write_overlay_svg
-    from warpflat.core import optional_file, output_folder, write_report
+    from warpflat.core import optional_file, output_folder, remove_stale
     from warpflat.garment import write_compared_drapes
 
     sources = [
@@ -109,8 +119,8 @@ def save_comparison(comparison: Comparison, folder: str | Path) -> list[str]:
         if comparison.drapes:
             with optional_file(to / "compare-drape.png", files) as path:
                 write_compared_drapes(path, comparison.drapes)
-        write_report(to / "compare.json", comparison.as_dict(), name="compare", files=files)
-    return [file for file in compared_files(drape=True) if file in ("compare.json", *files)]
+        _, notes = remove_stale(to, comparison.as_dict(), name="compare", files=files, report="compare.json")
+    return [file for file in compared_files(drape=True) if file in ("compare.json", *files)], notes
 
 
 def comparison_table(comparison: Comparison) -> str:

@@ -30,6 +30,7 @@ class Comparison:
             and shifted only.
         sewing: by fabric, how its seams and constraints came out, as in `metrics.json`; empty where nothing was sewn.
         drapes: by fabric, sewn and put on the body; empty unless that was asked for.
+        notes: on the cuts that all of them have, one sentence each.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Comparison:
     layouts: Mapping[str, Mapping[str, FloatArray]]
     sewing: Mapping[str, Mapping[str, Any]]
     drapes: Mapping[str, Drape] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     @property
     def fabrics(self) -> list[str]:
@@ -104,6 +106,7 @@ class Comparison:
             "sewing": {fabric: dict(how) for fabric, how in self.sewing.items()},
             **({"drapes": {name: drape.measures() for name, drape in self.drapes.items()}} if self.drapes else {}),
             "distances_m": {piece: self.distances(piece) for piece in self.pieces},
+            "notes": list(self.notes),
         }
 
 

@@ -242,14 +242,17 @@ class Fitted:
         }
 
 
-def write_study(folder: Path, fitted: Sequence[Fitted]) -> list[str]:
-    """Write `fit.json`, and of several bodies `fit.csv`, both or none, and return their names.
+def write_study(folder: Path, fitted: Sequence[Fitted]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Write `fit.json`, and of several bodies `fit.csv`, both or none.
+
+    Returns:
+        Their names, and what became of those of an earlier study, one sentence each.
 
     Raises:
         InputError: they cannot be written, or would replace what is not of warpflat.
     """
     from warpflat._version import __version__
-    from warpflat.core import output_folder, write_report
+    from warpflat.core import output_folder, remove_stale
 
     entries = [
         {**each.carried.as_dict(), "folder": str(each.folder), "fits": each.fits, "done": is_done(each.metrics)}
@@ -263,8 +266,9 @@ def write_study(folder: Path, fitted: Sequence[Fitted]) -> list[str]:
                 table = csv.DictWriter(file, list(rows[0]))
                 table.writeheader()
                 table.writerows(rows)
-        write_report(to / "fit.json", {"warpflat": __version__, "bodies": entries}, name="fit", files=files)
-    return list(files)
+        study = {"warpflat": __version__, "bodies": entries}
+        _, notes = remove_stale(to, study, name="fit", files=files, report="fit.json")
+    return files, notes
 
 
 def study_table(fitted: Sequence[Fitted]) -> str:

@@ -32,15 +32,22 @@ class DartEdit:
     Attributes:
         before, after: flattened and sewn.
         scene: that gives the second one.
+        notes: on cuts that were made by themselves and on darts that cannot be sewn, one sentence each.
     """
 
     before: FormGarment
     after: FormGarment
     scene: Scene
+    notes: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data in SI units: energies, share of cloth beyond its limit, and mouths of darts."""
-        return {"before": _measures(self.before), "after": _measures(self.after), "toml": self.as_toml()}
+        return {
+            "before": _measures(self.before),
+            "after": _measures(self.after),
+            "toml": self.as_toml(),
+            "notes": list(self.notes),
+        }
 
     def as_toml(self) -> str:
         """Return the tables `[[cuts]]` and `[[seams]]` of the scene."""
@@ -84,14 +91,15 @@ def edit_dart(
     Raises:
         InputError: the scene has no such dart, or the edit cannot be made.
     """
-    scene, _ = settle_shape(scene, device=device)
-    scene, before, _ = sewn_form(scene, device=device)
+    scene, shaped = settle_shape(scene, device=device)
+    scene, before, closed = sewn_form(scene, device=device)
     if how == "turn":
         edited = turn_dart(scene, dart, aim, before)
     else:
         edited = (rotate_dart if how == "rotate" else split_dart)(scene, dart, aim, at=at)
-    edited, after, _ = sewn_form(edited, device=device)
-    return DartEdit(before=before, after=after, scene=edited)
+    edited, after, closed_after = sewn_form(edited, device=device)
+    notes = tuple(dict.fromkeys((*shaped, *closed, *closed_after)))
+    return DartEdit(before=before, after=after, scene=edited, notes=notes)
 
 
 def rotate_dart(scene: Scene, dart: str, line: str, *, at: str | None = None) -> Scene:
