@@ -214,51 +214,32 @@ def _sheets(wish: FinishingTable, chain: _Chain) -> Iterator[_Sheet]:
         line = chain.points - (_BOUND if wish.kind == "binding" else wish.width) * chain.beyond
         yield _Sheet(rows=np.stack([chain.points, line]), out=chain.out, lines=((line, columns),), outlined=False)
     elif wish.kind in ("ruffle", "flounce"):
-        # It falls from its edge with pleats, gathers or folds.
-        arc = arc_lengths(chain.points)
-        out = {True: _PLEATS_OUT, False: min(_MOST_OUT, _GATHERS_OUT * wish.share)}[bool(wish.pleat)]
-        folds = max(2, round(arc[-1] / (wish.pleat or _GATHER_STEP)))
-        if wish.kind == "flounce":
-            out, folds = min(_MOST_OUT, _FLOUNCE_OUT * wish.turns), max(4, round(_FOLDS_A_TURN * wish.turns))
-        hem = chain.points + wish.width * unit(chain.beyond + out * level)
-        if not wish.pleat:
-            hem = hem + _WAVE * np.sin(2.0 * np.pi * folds * arc / arc[-1])[:, None] * chain.beyond
-        lines = []
-        for place in (np.arange(folds) + 0.25) * arc[-1] / folds:
-            column = float(np.interp(place, arc, columns))
-            top, bottom = (
-                np.array([np.interp(column, columns, row[:, axis]) for axis in range(3)]) for row in (chain.points, hem)
-            )
-            reach = [0.0, 1.0] if wish.pleat else [0.0, _GATHER_TO] if wish.kind == "ruffle" else [_FOLD_FROM, 1.0]
-            lines.append((top + np.outer(reach, bottom - top), np.full(2, column)))
-        yield _Sheet(rows=np.stack([chain.points, hem]), out=chain.out, lines=tuple(lines))
+        yield _falling(wish, chain, columns, level)
     elif wish.kind == "hood":
-        # It is worn up: over the head, open in front.
-        chain = chain.from_front()
-        girth = arc_lengths(chain.points)[-1]
-        share = arc_lengths(chain.points) / girth
-        middle = chain.points.mean(axis=0)
-        high, wide = _HOOD_HIGH * girth, _HOOD_WIDE * girth
-        # From one front edge around the back to the other.
-        turn = np.pi * (0.80 - 1.60 * share) * (1.0 if chain.points[len(share) // 4, 0] > middle[0] else -1.0)
-        around = np.column_stack([np.sin(turn), np.zeros(len(turn)), -np.cos(turn)])
-        rows = [chain.points]
-        for up in np.linspace(0.0, 1.0, 15)[1:]:
-            radius = (
-                wide * np.sqrt(max(1.0 - ((up - _HOOD_NECK) / (1.0 - _HOOD_NECK)) ** 2, 0.0))
-                if up > _HOOD_NECK
-                else wide
-            )
-            ring = middle + up * high * UP + radius * around
-            blend = min(up / _HOOD_NECK, 1.0)
-            rows.append((1.0 - blend) * (chain.points + up * high * UP) + blend * ring)
-        grid = np.stack(rows)
-        columns = np.arange(len(share), dtype=float)
-        front = [(grid[:, end], np.full(len(rows), columns[end])) for end in (0, -1)]
-        seam = grid[:, len(share) // 2], np.full(len(rows), columns[len(share) // 2])
-        yield _Sheet(rows=grid, out=around, lines=(*front, seam))
+        yield _hood(chain.from_front())
     elif wish.kind == "collar":
         yield from _collar(wish, chain, level)
+
+
+def _falling(wish: FinishingTable, chain: _Chain, columns: FloatArray, level: FloatArray) -> _Sheet:
+    """Return a ruffle or flounce as it falls from its edge: with pleats, gathers or folds."""
+    arc = arc_lengths(chain.points)
+    out = {True: _PLEATS_OUT, False: min(_MOST_OUT, _GATHERS_OUT * wish.share)}[bool(wish.pleat)]
+    folds = max(2, round(arc[-1] / (wish.pleat or _GATHER_STEP)))
+    if wish.kind == "flounce":
+        out, folds = min(_MOST_OUT, _FLOUNCE_OUT * wish.turns), max(4, round(_FOLDS_A_TURN * wish.turns))
+    hem = chain.points + wish.width * unit(chain.beyond + out * level)
+    if not wish.pleat:
+        hem = hem + _WAVE * np.sin(2.0 * np.pi * folds * arc / arc[-1])[:, None] * chain.beyond
+    lines = []
+    for place in (np.arange(folds) + 0.25) * arc[-1] / folds:
+        column = float(np.interp(place, arc, columns))
+        high, low = (
+            np.array([np.interp(column, columns, row[:, axis]) for axis in range(3)]) for row in (chain.points, hem)
+        )
+        share = [0.0, 1.0] if wish.pleat else [0.0, _GATHER_TO] if wish.kind == "ruffle" else [_FOLD_FROM, 1.0]
+        lines.append((high + np.outer(share, low - high), np.full(2, column)))
+    return _Sheet(rows=np.stack([chain.points, hem]), out=chain.out, lines=tuple(lines))
 
 
 def _collar(wish: FinishingTable, chain: _Chain, level: FloatArray) -> Iterator[_Sheet]:
@@ -293,3 +274,27 @@ def _collar(wish: FinishingTable, chain: _Chain, level: FloatArray) -> Iterator[
             rows=box[[[0, 3], [1, 2]]], out=np.tile([0.0, 0.0, 1.0], (2, 1)), lines=((box, np.array([0.0, 0.0, 1.0, 1.0])),),
             outlined=False,
         )  # fmt: skip
+
+
+def _hood(chain: _Chain) -> _Sheet:
+    """Return a hood as it is worn up: over the head, open in front."""
+    girth = arc_lengths(chain.points)[-1]
+    share = arc_lengths(chain.points) / girth
+    middle = chain.points.mean(axis=0)
+    high, wide = _HOOD_HIGH * girth, _HOOD_WIDE * girth
+    # From one front edge around the back to the other.
+    turn = np.pi * (0.80 - 1.60 * share) * (1.0 if chain.points[len(share) // 4, 0] > middle[0] else -1.0)
+    around = np.column_stack([np.sin(turn), np.zeros(len(turn)), -np.cos(turn)])
+    rows = [chain.points]
+    for up in np.linspace(0.0, 1.0, 15)[1:]:
+        radius = (
+            wide * np.sqrt(max(1.0 - ((up - _HOOD_NECK) / (1.0 - _HOOD_NECK)) ** 2, 0.0)) if up > _HOOD_NECK else wide
+        )
+        ring = middle + up * high * UP + radius * around
+        blend = min(up / _HOOD_NECK, 1.0)
+        rows.append((1.0 - blend) * (chain.points + up * high * UP) + blend * ring)
+    grid = np.stack(rows)
+    columns = np.arange(len(share), dtype=float)
+    front = [(grid[:, end], np.full(len(rows), columns[end])) for end in (0, -1)]
+    seam = grid[:, len(share) // 2], np.full(len(rows), columns[len(share) // 2])
+    return _Sheet(rows=grid, out=around, lines=(*front, seam))
