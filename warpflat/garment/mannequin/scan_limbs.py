@@ -327,9 +327,20 @@ def leg_curves(body: BodySections, levels: Mapping[str, float], hip: Profile) ->
         hip: the trunk's profile at the hip.
     """
     from scipy.ndimage import gaussian_filter1d
+    from scipy.spatial import ConvexHull
 
     legs = body.legs
-    crotch = _crotch(body, levels["hip"], hip)
+    # The crotch curve runs through air at the back, where cloth bridges the cleft, and nowhere inside the body.
+    height, front, back = levels["hip"], float(hip.curve[0, 1]), float(hip.curve[len(hip.curve) // 2, 1])
+    cut = body.slicer.points(np.array([1.0, 0.0, 0.0]), 1e-5)
+    near = (cut[:, 1] < height) & (cut[:, 1] > body.lowest - 1e-6) & (cut[:, 2] < front) & (cut[:, 2] > back)
+    flat = np.concatenate([crotch_curve(height, body.lowest, front, back)[:, [2, 1]], cut[near][:, [2, 1]]])
+    hull = flat[ConvexHull(flat).vertices]
+    order = np.argsort(np.arctan2(hull[:, 1] - height - 1e-4, hull[:, 0] - 0.5 * (front + back)))
+    hull = hull[order][::-1]
+    hull = np.roll(hull, -int(np.argmax(hull[:, 0])), axis=0)
+    line = resample(hull, np.linspace(0.0, 1.0, 200))
+    crotch = np.column_stack([np.zeros(len(line)), line[:, 1], line[:, 0]])
     point = float(resample(crotch, _POINT)[2])
     thigh, knee = levels["leg_thigh"], levels["leg_knee"]
     curves: dict[str, FloatArray] = {}
@@ -397,20 +408,3 @@ def _seat_attractor(body: BodySections, low: float, high: float, half: float) ->
         return np.where(inside[:, None], place, where)
 
     return attract
-
-
-def _crotch(body: BodySections, hip: float, profile: Profile) -> FloatArray:
-    """Return the crotch curve: through air at the back, where cloth bridges the cleft, and nowhere inside the body."""
-    from scipy.spatial import ConvexHull
-
-    front, back = float(profile.curve[0, 1]), float(profile.curve[len(profile.curve) // 2, 1])
-    curve = crotch_curve(hip, body.lowest, front, back)
-    cut = body.slicer.points(np.array([1.0, 0.0, 0.0]), 1e-5)
-    inside = (cut[:, 1] < hip) & (cut[:, 1] > body.lowest - 1e-6) & (cut[:, 2] < front) & (cut[:, 2] > back)
-    flat = np.concatenate([curve[:, [2, 1]], cut[inside][:, [2, 1]]])
-    hull = flat[ConvexHull(flat).vertices]
-    order = np.argsort(np.arctan2(hull[:, 1] - hip - 1e-4, hull[:, 0] - 0.5 * (front + back)))
-    hull = hull[order][::-1]
-    hull = np.roll(hull, -int(np.argmax(hull[:, 0])), axis=0)
-    line = resample(hull, np.linspace(0.0, 1.0, 200))
-    return np.column_stack([np.zeros(len(line)), line[:, 1], line[:, 0]])
