@@ -88,12 +88,7 @@ def find_places(
         area = float(areas[part].sum())
         if area < _LEAST_AREA:
             return
-        # The line that is nearest on the designed surface.
-        distances = {
-            name: float(np.linalg.norm(cloth.designed[ids] - cloth.designed[worst], axis=1).min())
-            for name, ids in cloth.lines.items()
-        }
-        line = min(distances, key=distances.__getitem__) if distances else ""
+        line = _line_at(cloth, worst)
         piece, _, near = line.partition(".")
         # The leg of a dart is called by the dart.
         near = re.sub(r"\.(left|right)$", "", near).replace("_", " ")
@@ -165,3 +160,12 @@ def _parts(cloth: SewnCloth, chosen: BoolArray) -> list[IntArray]:
     inside = chosen[a] & chosen[b]
     label = join_labels(len(chosen), a[inside], b[inside])
     return [np.flatnonzero(label == part).astype(np.int32) for part in np.unique(label[chosen])]
+
+
+def _line_at(cloth: SewnCloth, vertex: int) -> str:
+    """Return the line nearest to a vertex on the designed surface."""
+    place = cloth.designed[vertex]
+    distances = {
+        name: float(np.linalg.norm(cloth.designed[ids] - place, axis=1).min()) for name, ids in cloth.lines.items()
+    }
+    return min(distances, key=distances.__getitem__) if distances else ""
