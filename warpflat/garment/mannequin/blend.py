@@ -326,6 +326,7 @@ def _move_legs(
 ) -> None:
     """Move crotch curve and legs, with the hip's row from which they hang."""
     from scipy.interpolate import PchipInterpolator
+    from scipy.optimize import brentq
 
     curve = layout.crotch
     change = changes.get("crotch", (Adjustment(), 0.0))[0]
@@ -345,6 +346,10 @@ def _move_legs(
         out[grid[between]] = body[grid[between]] + PchipInterpolator(rows, np.stack(moves), axis=0)(between)
     move = out - body
     fill_fork(move, layout)
+
+    def too_wide(share: float, skin: FloatArray, off: FloatArray, wished: float) -> float:
+        return convex_girth(skin + share * off) - wished
+
     row_of = {level: layout.leg_row[level] for level in LEG_LEVELS[1:]}
     for grid in layout.legs.values():
         fork = grid[1 : layout.leg_row["leg_thigh"]]
@@ -367,34 +372,15 @@ def _move_legs(
             ramp = np.interp(np.arange(knee + 1), [0, 0.5 * thigh, 0.5 * (thigh + knee), knee], [0.0, 1.0, 1.0, 0.0])
             bow = smooth(upper, _THIGH_BOW / max(apart, 1e-9)) - upper
             out[grid[1:knee]] += (smoothstep(ramp)[:, None, None] * bow)[1:knee]
-            _take_in_thigh(out, body, grid, row_of["leg_thigh"], wished)
-
-
-def _take_in_thigh(out: FloatArray, body: FloatArray, grid: IntArray, thigh: int, wished: float) -> None:
-    """Draw a leg that hangs towards the body at the thigh until its girth there is as wished; it stays straight down to its end.
-
-    Args:
-        out: #V by 3 [m], changed in place.
-        body: #V by 3 [m].
-        grid: of the leg, from the crotch curve down.
-        thigh: the thigh's row.
-        wished: girth there [m].
-    """
-    from scipy.optimize import brentq
-
-    skin, off = body[grid[thigh]], out[grid[thigh]] - body[grid[thigh]]
-
-    def too_wide(share: float) -> float:
-        return convex_girth(skin + share * off) - wished
-
-    if too_wide(1.0) <= 0.0 or too_wide(0.0) >= 0.0:
-        return
-    apart = np.linalg.norm(np.diff(out[grid].mean(axis=1), axis=0), axis=1)
-    below = np.cumsum(apart[thigh:])
-    up = np.arange(thigh + 1) / thigh
-    near = np.concatenate([np.sin(0.5 * np.pi * up), 1.0 - below / below[-1]])
-    taken = (1.0 - brentq(too_wide, 0.0, 1.0, xtol=1e-4)) * near
-    out[grid[1:]] -= (taken[:, None, None] * off)[1:]
+            # The leg is drawn towards the body at the thigh until its girth there is as wished, and stays straight down to its end.
+            skin = body[grid[thigh]]
+            off = out[grid[thigh]] - skin
+            if too_wide(1.0, skin, off, wished) > 0.0 > too_wide(0.0, skin, off, wished):
+                below = np.cumsum(np.linalg.norm(np.diff(out[grid].mean(axis=1), axis=0), axis=1)[thigh:])
+                up = np.arange(thigh + 1) / thigh
+                share_off = np.concatenate([np.sin(0.5 * np.pi * up), 1.0 - below / below[-1]])
+                taken = (1.0 - brentq(too_wide, 0.0, 1.0, args=(skin, off, wished), xtol=1e-4)) * share_off
+                out[grid[1:]] -= (taken[:, None, None] * off)[1:]
 
 
 def _hang(out: FloatArray, layout: Layout, grid: IntArray, near: FloatArray | None = None) -> None:

@@ -148,7 +148,19 @@ def _piece(
     inside = set(np.unique(layout.faces[rows]).tolist())
     darts = {dart: row for dart, row in darts.items() if inside.issuperset(row.tolist())}
     slits = {(min(a, b), max(a, b)) for row in darts.values() for a, b in itertools.pairwise(row.tolist())}
-    corners, grid_vertices = _split(layout.faces[rows], layout.edges_along(*opened) | slits)
+    # Vertices are doubled along cuts: two corners at one vertex are one vertex of the piece if a chain of faces joins them without crossing
+    # a cut.
+    cut = layout.edges_along(*opened) | slits
+    he = half_edges(layout.faces[rows])
+    a, b = paired_half_edges(he)
+    whole = np.array([(low, high) not in cut for low, high in he.edges.tolist()])[he.edge[a]]
+    fan = fan_labels(he, a[whole], b[whole])
+    vertex = he.tail[np.unique(fan, return_index=True)[1]]
+    # Numbered in the mannequin's order, so that a piece is the same in every size.
+    order = np.argsort(vertex, kind="stable")
+    number = np.empty(len(order), np.int32)
+    number[order] = np.arange(len(order))
+    corners, grid_vertices = number[fan].reshape(-1, 4), vertex[order]
     sides = half_edges(corners)
     loops = border_loops(sides)
     # By Euler: every further loop is a hole of the one disk.
@@ -190,23 +202,6 @@ def _piece(
         face_brick=tuple(names[i] for i in layout.face_brick[rows]), parts=parts,
         darts={dart: _legs(dart) for dart in darts}, fisheyes=fisheyes,
     )  # fmt: skip
-
-
-def _split(faces: IntArray, cut: set[tuple[int, int]]) -> tuple[IntArray, IntArray]:
-    """Return faces renumbered to the piece's own vertices, which are doubled along the edges in `cut`.
-
-    Two corners at one vertex are one vertex of the piece if a chain of faces joins them without crossing the cut.
-    """
-    he = half_edges(faces)
-    a, b = paired_half_edges(he)
-    whole = np.array([(low, high) not in cut for low, high in he.edges.tolist()])[he.edge[a]]
-    fan = fan_labels(he, a[whole], b[whole])
-    vertex = he.tail[np.unique(fan, return_index=True)[1]]
-    # Numbered in the mannequin's order, so that a piece is the same in every size.
-    order = np.argsort(vertex, kind="stable")
-    number = np.empty(len(order), np.int32)
-    number[order] = np.arange(len(order))
-    return number[fan].reshape(-1, 4), vertex[order]
 
 
 def _not_one_disk(name: str, *, opened: bool, darts: Collection[str]) -> str:
