@@ -69,21 +69,9 @@ class Coarsening:
 @once_per_surface
 def _next(surface: Surface) -> Coarsening | None:
     grid = rows_and_columns(surface)
-    return coarsen(surface) if grid is None else _every_second(surface, grid)
-
-
-def iterate_coarsenings(surface: Surface, smallest: int = _COARSEST) -> Iterator[Coarsening]:
-    """Iterate over the coarser meshes of a surface of more than `smallest` vertices, the finest first; each is made once."""
-    while len(surface.vertices) > smallest:
-        step = _next(surface)
-        if step is None:
-            return
-        yield step
-        surface = step.surface
-
-
-def _every_second(surface: Surface, grid: IntArray) -> Coarsening:
-    """Keep every second row and column of a grid (#rows by #columns vertices), and the last ones; between them layouts are bilinear."""
+    if grid is None:
+        return coarsen(surface)
+    # Every second row and column of a grid is kept, and the last ones; between them layouts are bilinear.
     place = np.empty(grid.size, dtype=np.int32)
     place[grid.ravel()] = np.arange(grid.size, dtype=np.int32)
     lines = [np.union1d(np.arange(0, count, 2), count - 1) for count in grid.shape]
@@ -111,6 +99,16 @@ def _every_second(surface: Surface, grid: IntArray) -> Coarsening:
         prolongation=csr_array(kron(*between, format="csr"))[place],
         face_of=face_at[np.ix_(*(line[:-1] for line in lines))].ravel(),
     )
+
+
+def iterate_coarsenings(surface: Surface, smallest: int = _COARSEST) -> Iterator[Coarsening]:
+    """Iterate over the coarser meshes of a surface of more than `smallest` vertices, the finest first; each is made once."""
+    while len(surface.vertices) > smallest:
+        step = _next(surface)
+        if step is None:
+            return
+        yield step
+        surface = step.surface
 
 
 def coarsen(surface: Surface) -> Coarsening | None:
@@ -163,21 +161,16 @@ def coarsen(surface: Surface) -> Coarsening | None:
         faces=np.column_stack([corners, np.full(len(corners), -1)]).astype(np.int32),
         name=surface.name,
     )
-    prolongation = _prolongation(gone, parent, weight, int(passes[0]))
-    return Coarsening(surface=coarse, kept=kept, into=into, prolongation=prolongation, face_of=face[whole])
-
-
-def _prolongation(gone: wp.array, parent: wp.array, weight: wp.array, passes: int) -> csr_array:
-    """Return the weights of interpolation, #V by #C: a collapsed vertex has the weighted sum of its parents' rows."""
-    count, capacity = len(gone), _ENTRIES * len(gone)
-    row, offset = np.empty(count, dtype=np.int32), np.zeros(count + 1, dtype=np.int32)
+    # The weights of interpolation: a collapsed vertex has the weighted sum of its parents' rows.
+    capacity, row, offset = _ENTRIES * count, np.empty(count, dtype=np.int32), np.zeros(count + 1, dtype=np.int32)
     while offset[-1] == 0:
         column, value = np.empty(capacity, dtype=np.int32), np.empty(capacity)
-        given, made = [gone, parent, weight, passes], [row, offset, column, value]
+        given, made = [gone, parent, weight, int(passes[0])], [row, offset, column, value]
         launch_quietly(compose_rows, dim=1, inputs=given, outputs=made, device="cpu")
         capacity *= 2
-    kept, end = count - np.count_nonzero(gone.numpy()), offset[-1]
-    return csr_array(csr_array((value[:end], column[:end], offset), shape=(count, kept))[row])
+    end = offset[-1]
+    prolongation = csr_array(csr_array((value[:end], column[:end], offset), shape=(count, len(kept)))[row])
+    return Coarsening(surface=coarse, kept=kept, into=into, prolongation=prolongation, face_of=face[whole])
 
 
 def _as_input(values: np.ndarray[Any, Any], dtype: type) -> wp.array:
