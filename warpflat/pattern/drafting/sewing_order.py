@@ -7,7 +7,7 @@ closes a ring, panels of one side of the body before its halves, and these befor
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
@@ -405,7 +405,15 @@ class _Workshop(SewingTasks):
         copied = any(part.copy for each in group for part in each.stretches)
         equal = copied and len({part.piece for each in group for part in each.stretches}) > 2
         by_pieces = by_pieces or equal
-        first, second = (self._words([each.sides[k] for each in (group if equal else group[:1])]) for k in (0, 1))
+        titles = list[str]()
+        for k in (0, 1):
+            # The pieces of each row once: those in a row are sewn to each other before.
+            found: dict[frozenset[str], str] = {}
+            for each in group if equal else group[:1]:
+                row = dict.fromkeys(self.titles[part.piece] for part in each.sides[k])
+                found.setdefault(frozenset(row), " + ".join(row))
+            titles.append(", ".join(found.values()))
+        first, second = titles
         if not by_pieces:
             name = translate_name(without_side(seam.name) if sideless else seam.name)
         else:
@@ -426,11 +434,3 @@ class _Workshop(SewingTasks):
                 places=tuple(places),
             )
         ]
-
-    def _words(self, rows: Iterable[Sequence[SeamSide]]) -> str:
-        """Return the pieces of each row once: those in a row are sewn to each other before."""
-        found: dict[frozenset[str], str] = {}
-        for row in rows:
-            titles = dict.fromkeys(self.titles[part.piece] for part in row)
-            found.setdefault(frozenset(titles), " + ".join(titles))
-        return ", ".join(found.values())

@@ -123,7 +123,15 @@ class SewingTasks:
             key = without_side(seam.name), tuple(sides), seam.openings
             if any(self.pieces[side.piece].is_pair for side in seam.stretches):
                 # Whatever its name, the seam of the copies that are turned over is the mirror image, at the other sides of other pieces.
-                image = [[_mirror_image(side, self.pieces[side.piece]) for side in row] for row in seam.sides]
+                image = [
+                    [
+                        replace(side, mirrored=not side.mirrored)
+                        if self.pieces[side.piece].is_pair
+                        else replace(side, edge=other_side(side.edge))
+                        for side in row
+                    ]
+                    for row in seam.sides
+                ]
                 here, there = (
                     frozenset(frozenset((side.place, side.mirrored) for side in row) for row in rows)
                     for rows in (seam.sides, image)
@@ -369,7 +377,13 @@ class SewingTasks:
         self._add("tie_on", tied)
         for technique in ("dart", "pleat"):
             for piece in self.drafted.values():
-                legs = _dart_legs(piece, pleats=technique == "pleat")
+                # The edges of its darts, or of its pleats, by the names that are printed; a fisheye dart is its own line.
+                legs = dict[str, list[str]]()
+                pleats = technique == "pleat"
+                for dart in (each.dart for each in piece.darts if (each.dart.pleat is not None) == pleats):
+                    legs.setdefault(translate_name(without_side(dart.name)), []).extend([dart.left, dart.right])
+                for name in () if pleats else piece.fisheyes:
+                    legs.setdefault(translate_name(without_side(name)), []).append(name)
                 if legs:
                     self._add(technique, [piece.name], darts=f"{self.titles[piece.name]}: {listed(list(legs))}")
                     self.tasks[-1].places = [(piece.name, leg) for row in legs.values() for leg in row]
@@ -502,11 +516,6 @@ def is_flounce(piece: Piece) -> bool:
     return "flounce" in re.split("[ _]", piece.name)
 
 
-def _mirror_image(side: SeamSide, piece: Piece) -> SeamSide:
-    """Return the stretch of the mirrored seam: of a pair the copy that is turned over, else the edge of the other side."""
-    return replace(side, mirrored=not side.mirrored) if piece.is_pair else replace(side, edge=other_side(side.edge))
-
-
 def _buttons_at_one_end(piece: DraftedPiece) -> bool:
     """Return whether a strip buttons upon itself: a cuff, or the stand of a collar."""
     return piece.piece.role in ("cuff", "collar", "waistband") and "button" in piece.piece.marks
@@ -514,14 +523,3 @@ def _buttons_at_one_end(piece: DraftedPiece) -> bool:
 
 def pieces_of(places: Iterable[Place]) -> list[str]:
     return list(dict.fromkeys(piece for piece, _ in places))
-
-
-def _dart_legs(piece: DraftedPiece, *, pleats: bool) -> dict[str, list[str]]:
-    """Return the edges of a piece's darts, or of its pleats, by the names that are printed; a fisheye dart is its own line."""
-    legs: dict[str, list[str]] = {}
-    for dart in (each.dart for each in piece.darts):
-        if (dart.pleat is not None) == pleats:
-            legs.setdefault(translate_name(without_side(dart.name)), []).extend([dart.left, dart.right])
-    for name in () if pleats else piece.fisheyes:
-        legs.setdefault(translate_name(without_side(name)), []).append(name)
-    return legs

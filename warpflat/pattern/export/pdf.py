@@ -240,6 +240,7 @@ def _pages(
     """
     from reportlab import rl_config
     from reportlab.pdfbase import pdfmetrics
+    from reportlab.pdfbase.pdfdoc import PDFArray, PDFDictionary, PDFName, PDFResourceDictionary, PDFString, xObjectName
     from reportlab.pdfgen.canvas import Canvas
 
     kind, stream, chosen = tiling.paper, BytesIO(), tuple(whole.pieces)
@@ -282,7 +283,21 @@ def _pages(
         page_footer(canvas, whole.name, kind, translate("sheet {name}", name=title))
         canvas.showPage()
     if len(chosen) > 1:
-        _list_layers(canvas, chosen, ["sheet", *forms.values()])
+        # Layers, one a size, are optional content that readers list and can hide.
+        document = canvas._doc
+        groups = {
+            f"size{k}": document.Reference(PDFDictionary({"Type": PDFName("OCG"), "Name": PDFString(f"Size {size}")}))
+            for k, size in enumerate(chosen)
+        }
+        for name in ("sheet", *forms.values()):
+            form = document.idToObject[xObjectName(name)]
+            form.Resources = PDFResourceDictionary(Properties=groups)
+            form.Resources.basicFonts()
+        order, catalog = PDFArray(list(groups.values())), document.Catalog
+        catalog.OCProperties = PDFDictionary(
+            {"OCGs": order, "D": PDFDictionary({"Order": order, "ON": order, "Name": PDFString("Sizes")})}
+        )
+        catalog.__NoDefault__ = [*catalog.__NoDefault__, "OCProperties"]
     canvas.save()
     return stream.getvalue()
 
@@ -315,26 +330,6 @@ def _sheet_form(
     if sheet.reserved is not None:
         draw_legend(canvas, sheet.reserved, printed, chosen, tiling.paper.name)
     canvas.endForm()
-
-
-def _list_layers(canvas: Any, sizes: Sequence[str], forms: Sequence[str]) -> None:
-    """Make the layers of forms, one a size, optional content that readers list and can hide."""
-    from reportlab.pdfbase.pdfdoc import PDFArray, PDFDictionary, PDFName, PDFResourceDictionary, PDFString, xObjectName
-
-    document = canvas._doc
-    groups = {
-        f"size{k}": document.Reference(PDFDictionary({"Type": PDFName("OCG"), "Name": PDFString(f"Size {size}")}))
-        for k, size in enumerate(sizes)
-    }
-    for name in forms:
-        form = document.idToObject[xObjectName(name)]
-        form.Resources = PDFResourceDictionary(Properties=groups)
-        form.Resources.basicFonts()
-    order, catalog = PDFArray(list(groups.values())), document.Catalog
-    catalog.OCProperties = PDFDictionary(
-        {"OCGs": order, "D": PDFDictionary({"Order": order, "ON": order, "Name": PDFString("Sizes")})}
-    )
-    catalog.__NoDefault__ = [*catalog.__NoDefault__, "OCProperties"]
 
 
 def _word_forms(
