@@ -161,16 +161,21 @@ def coarsen(surface: Surface) -> Coarsening | None:
         faces=np.column_stack([corners, np.full(len(corners), -1)]).astype(np.int32),
         name=surface.name,
     )
-    # The weights of interpolation: a collapsed vertex has the weighted sum of its parents' rows.
-    capacity, row, offset = _ENTRIES * count, np.empty(count, dtype=np.int32), np.zeros(count + 1, dtype=np.int32)
+    prolongation = _prolongation(gone, parent, weight, int(passes[0]))
+    return Coarsening(surface=coarse, kept=kept, into=into, prolongation=prolongation, face_of=face[whole])
+
+
+def _prolongation(gone: wp.array, parent: wp.array, weight: wp.array, passes: int) -> csr_array:
+    """Return the weights of interpolation, #V by #C: a collapsed vertex has the weighted sum of its parents' rows."""
+    count, capacity = len(gone), _ENTRIES * len(gone)
+    row, offset = np.empty(count, dtype=np.int32), np.zeros(count + 1, dtype=np.int32)
     while offset[-1] == 0:
         column, value = np.empty(capacity, dtype=np.int32), np.empty(capacity)
-        given, made = [gone, parent, weight, int(passes[0])], [row, offset, column, value]
+        given, made = [gone, parent, weight, passes], [row, offset, column, value]
         launch_quietly(compose_rows, dim=1, inputs=given, outputs=made, device="cpu")
         capacity *= 2
-    end = offset[-1]
-    prolongation = csr_array(csr_array((value[:end], column[:end], offset), shape=(count, len(kept)))[row])
-    return Coarsening(surface=coarse, kept=kept, into=into, prolongation=prolongation, face_of=face[whole])
+    kept, end = count - np.count_nonzero(gone.numpy()), offset[-1]
+    return csr_array(csr_array((value[:end], column[:end], offset), shape=(count, kept))[row])
 
 
 def _as_input(values: np.ndarray[Any, Any], dtype: type) -> wp.array:

@@ -117,7 +117,6 @@ def draw_sheet(printed: DraftedGarment, paper: str) -> tuple[Tiling, list[tuple[
 
     # A layout that needs few pages.
     groups, kind = nests(printed), PAPERS[paper]
-    placed = list[Placed]()
     if kind.tiled:
         # Pieces, turned where that helps, on the tiles of a grid, of which they take few.
         shapes = []
@@ -126,6 +125,7 @@ def draw_sheet(printed: DraftedGarment, paper: str) -> tuple[Tiling, list[tuple[
             shape = shapely.union_all([shapely.Polygon(ring) for ring in rings])
             # A label beside its piece belongs to it, with all between.
             shapes.append(shape if len(rings) == len(group) else shape.convex_hull)
+        placed = list[Placed]()
         turned, size = nest_on_tiles(shapes, step=kind.step, overlap=kind.overlap, gap=0.004)
         for group, shape, laid in zip(groups, shapes, turned, strict=True):
             quarter = np.array([[0.0, -1.0], [1.0, 0.0]])

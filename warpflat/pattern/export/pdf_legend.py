@@ -139,8 +139,8 @@ def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], shee
             for text, least in ((names[middle.name], 0.7), (str(number), 0.5))
         )
         label = next((each for each in labels if each is not None), None)
-        for row in () if label is None else label.words():
-            small = replace(row, height=row.height * scale, bold=False)
+        for written in () if label is None else label.words():
+            small = replace(written, height=written.height * scale, bold=False)
             draw_words(canvas, small, np.column_stack([scale * np.eye(2), origin]))
     page_footer(canvas, garment.name, paper, translate("print this page first and measure both squares"))
     canvas.showPage()
