@@ -99,8 +99,8 @@ def read_svg(path: str | os.PathLike[str], *, allowance: float | None = None) ->
             both = [side for side in lengths if side is not None]
             if lengths[0] is not None or lengths[1] is not None:
                 if not all(0.0 < number < np.inf for number in (*both, *view)):
-                    words = " and ".join(f"{key} {quote_value(root.get(key))}" for key in _SIDES if root.get(key))
-                    raise InputError(f"{words} and viewBox {quote_value(' '.join(box))} must be numbers above 0")
+                    told = " and ".join(f"{key} {quote_value(root.get(key))}" for key in _SIDES if root.get(key))
+                    raise InputError(f"{told} and viewBox {quote_value(' '.join(box))} must be numbers above 0")
                 ratios = [side / wide for side, wide in zip(lengths, view, strict=True) if side is not None]
                 stretched = root.get("preserveAspectRatio", "").strip() == "none" and len(ratios) == 2
                 scale = ratios if stretched else [min(ratios)] * 2
