@@ -106,38 +106,38 @@ def read_body_patterns(rows: Sequence[Row], out: Path) -> list[BodyPattern]:
         rows: of a batch.
         out: its folder.
     """
-    read = (_read(row, out) for row in rows if row.status in (AT_REST, NOT_AT_REST))
-    return compare_with_sizes([pattern for pattern in read if pattern is not None])
-
-
-def _read(row: Row, out: Path) -> BodyPattern | None:
-    try:
-        metrics = read_result(out / row.task.key / "metrics.json")
-        if not has_seal(metrics):
-            return None  # nobody knows what it holds
-        levels = metrics["mannequin"]["levels"]
-        girths = {level: float(levels[level]["girth_m"]) for level in BODY_GIRTHS}
-    except (ValueError, KeyError, TypeError):
-        return None
-    body = row.task.data.get("mannequin") or {}
-    pieces = list(metrics["pieces"].values())
-    measures = {
-        "area": sum(piece["area_m2"] for piece in pieces),
-        "strain_energy": sum(piece["strain_energy_j"] for piece in pieces),
-    }
-    if darts := [dart["intake_m"] for piece in pieces for dart in piece.get("darts", ())]:
-        measures["dart_intake"] = sum(darts)
-    sides = [seam for seam in metrics.get("seams", ()) if "side" in seam["name"] and "left" in seam["name"]]
-    if sides:
-        measures["side_seam"] = 1e-3 * sum(seam["length_mm"][0] for seam in sides)
-    return BodyPattern(
-        row=row,
-        is_size=not {"scan", "measurements"} & {key for key, value in body.items() if value},
-        girths=girths,
-        measures=measures,
-        pattern_girths={level: value for level, value in row.girths_m.items() if level in girths},
-        strain_limit=min((piece["wear"]["strain_limit"] for piece in pieces if piece.get("wear")), default=0.0),
-    )
+    patterns = list[BodyPattern]()
+    for row in (row for row in rows if row.status in (AT_REST, NOT_AT_REST)):
+        try:
+            metrics = read_result(out / row.task.key / "metrics.json")
+            if not has_seal(metrics):
+                continue  # nobody knows what it holds
+            levels = metrics["mannequin"]["levels"]
+            girths = {level: float(levels[level]["girth_m"]) for level in BODY_GIRTHS}
+        except (ValueError, KeyError, TypeError):
+            continue
+        body = row.task.data.get("mannequin") or {}
+        pieces = list(metrics["pieces"].values())
+        measures = {
+            "area": sum(piece["area_m2"] for piece in pieces),
+            "strain_energy": sum(piece["strain_energy_j"] for piece in pieces),
+        }
+        if darts := [dart["intake_m"] for piece in pieces for dart in piece.get("darts", ())]:
+            measures["dart_intake"] = sum(darts)
+        sides = [seam for seam in metrics.get("seams", ()) if "side" in seam["name"] and "left" in seam["name"]]
+        if sides:
+            measures["side_seam"] = 1e-3 * sum(seam["length_mm"][0] for seam in sides)
+        patterns.append(
+            BodyPattern(
+                row=row,
+                is_size=not {"scan", "measurements"} & {key for key, value in body.items() if value},
+                girths=girths,
+                measures=measures,
+                pattern_girths={level: value for level, value in row.girths_m.items() if level in girths},
+                strain_limit=min((piece["wear"]["strain_limit"] for piece in pieces if piece.get("wear")), default=0.0),
+            )
+        )
+    return compare_with_sizes(patterns)
 
 
 def compare_with_sizes(patterns: Sequence[BodyPattern]) -> list[BodyPattern]:

@@ -67,7 +67,8 @@ class BatchIndex:
             InputError: they cannot be written.
         """
         rows = self.rows
-        levels, table = _levels(rows), io.StringIO()
+        levels = list(dict.fromkeys(level for row in rows for level in row.girths_m))
+        table = io.StringIO()
         writer = csv.writer(table)
         head = ["key", "status", "scene", "body", "fabric", "override", "strain_energy_j", "fits"]
         writer.writerow([*head, *(f"{level}_m" for level in levels), "seconds", "memory_mb", "message"])
@@ -121,11 +122,6 @@ class BatchIndex:
             files = [*texts, *(["bodies.csv", "bodies.png"] if bodies else [])]
             write_report(folder / "batch.json", {"warpflat": __version__}, name="batch", files=files)
         self._written = time.monotonic()
-
-
-def _levels(rows: Sequence[Row]) -> list[str]:
-    """Return the levels of all girths, in their first order."""
-    return list(dict.fromkeys(level for row in rows for level in row.girths_m))
 
 
 def _column(name: str, values: Sequence[str], shown: Sequence[str] | None = None) -> list[str]:

@@ -154,44 +154,32 @@ def load_batch(path: str | Path) -> list[Task]:
     )
     tasks: dict[str, Task] = {}
     differ = table.overrides is None or len(table.overrides) > 1  # one for all tells none apart
-    for entry in table.all_tasks():
-        task = _make_task(entry, path, read, digest, override=_label(entry.override) if differ else "")
-        tasks.setdefault(task.key, task)
-    return list(tasks.values())
-
-
-def _make_task(
-    entry: TaskTable,
-    path: Path,
-    read: Callable[[Path], dict[str, Any]],
-    digest: Callable[[Path], str],
-    *,
-    override: str,
-) -> Task:
     folder = path.parent.absolute()
-    source = entry.scene if entry.scene is not None else str(entry.form)
-    parts = [source, "" if entry.body is None else entry.body.label, entry.fabric or "", override]
-    where = f"{path}: {', '.join(filter(None, parts))}"
-    with errors_named(where):
-        if entry.scene is not None:
-            file = folder / expand_variables(entry.scene)
-            data, name = read(file), file.stem
-        else:
-            data, name = {"form": entry.form}, source
-        if entry.body is not None:
-            kept = {"resolution_mm"} & _table(data, "mannequin").keys()
-            body = {key: _table(data, "mannequin")[key] for key in kept} | entry.body.as_mannequin()
-            if body.get("scan"):
-                body["scan"] = _path(body["scan"], folder)
-            data = data | {"mannequin": body}
-        if entry.fabric is not None:
-            data = data | {"fabric": entry.fabric}
-        data = laid_over(data, _with_absolute_paths(entry.override, folder), joins=False)
-        scene = make_scene(data, name=name, folder=folder, where=where)
-        settings = scene.settings
-        # The key is a hash of the version, the resolved scene, and the contents of the files that it names. Digests stand
-        # for paths: a file that is moved leaves the key as it is, a file that changes does not.
-        named = _map_paths(settings.model_dump(mode="json"), lambda file: digest(Path(file)))
+    for entry in table.all_tasks():
+        override = _label(entry.override) if differ else ""
+        source = entry.scene if entry.scene is not None else str(entry.form)
+        parts = [source, "" if entry.body is None else entry.body.label, entry.fabric or "", override]
+        where = f"{path}: {', '.join(filter(None, parts))}"
+        with errors_named(where):
+            if entry.scene is not None:
+                file = folder / expand_variables(entry.scene)
+                data, name = read(file), file.stem
+            else:
+                data, name = {"form": entry.form}, source
+            if entry.body is not None:
+                kept = {"resolution_mm"} & _table(data, "mannequin").keys()
+                body = {key: _table(data, "mannequin")[key] for key in kept} | entry.body.as_mannequin()
+                if body.get("scan"):
+                    body["scan"] = _path(body["scan"], folder)
+                data = data | {"mannequin": body}
+            if entry.fabric is not None:
+                data = data | {"fabric": entry.fabric}
+            data = laid_over(data, _with_absolute_paths(entry.override, folder), joins=False)
+            scene = make_scene(data, name=name, folder=folder, where=where)
+            settings = scene.settings
+            # The key is a hash of the version, the resolved scene, and the contents of the files that it names. Digests stand
+            # for paths: a file that is moved leaves the key as it is, a file that changes does not.
+            named = _map_paths(settings.model_dump(mode="json"), lambda file: digest(Path(file)))
         text = json.dumps([__version__, scene.name, named], sort_keys=True)
         body_table = entry.body or settings.mannequin
         label = "" if body_table is None else body_table.label
@@ -199,8 +187,9 @@ def _make_task(
         # Who looks into the folder finds a task by its words; the digits tell apart what they leave out.
         words = "-".join(filter(None, (scene.name, label, fabric)))
         plain = with_plain_letters(words)[:_KEY_LETTERS].strip("_.-")
-        return Task(
-            key=f"{plain}-{hashlib.sha256(text.encode()).hexdigest()[:_KEY_DIGITS]}",
+        key = f"{plain}-{hashlib.sha256(text.encode()).hexdigest()[:_KEY_DIGITS]}"
+        task = Task(
+            key=key,
             name=name,
             scene=scene.name,
             body=label,
@@ -209,6 +198,8 @@ def _make_task(
             data=data,
             where=where,
         )
+        tasks.setdefault(key, task)
+    return list(tasks.values())
 
 
 def _with_absolute_paths(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:

@@ -37,7 +37,8 @@ def summary_lines(
     pieces, verdict, lines = metrics["pieces"], metrics.get("verdict"), list[str]()
     unfinished = [name for name, piece in pieces.items() if not piece["stages"][-1]["converged"]]
     flips = sum(piece["flipped_faces"] for piece in pieces.values())
-    wrong = [f"NOT at rest: {_some(unfinished)}"] if unfinished else []
+    beyond = f" and {len(unfinished) - 3} more" if len(unfinished) > 3 else ""
+    wrong = [f"NOT at rest: {', '.join(unfinished[:3])}{beyond}"] if unfinished else []
     wrong += [format_count(flips, "flipped face")] if flips else []
     findings = verdict["findings"] if verdict else []
     failing, told = ([each for each in findings if each["fails"] is fails] for fails in (True, False))
@@ -80,7 +81,19 @@ def summary_lines(
     elif "pattern.pdf" in files:
         lines.append(f"print {shlex.quote(f'{folder}/pattern.pdf')}")
     ordered = sorted(files, key=lambda name: _OPENED_FIRST.index(name) if name in _OPENED_FIRST else len(_OPENED_FIRST))
-    return [*(_clipped(line, width) for line in lines if line), _listed(f"{shlex.quote(folder)}: ", ordered, width)]
+    # A long line is cut after a word that leaves room for dots.
+    lines = [
+        line if width is None or len(line) <= width else line[: width - 3].rpartition(" ")[0].rstrip(",;(") + " ..."
+        for line in lines
+        if line
+    ]
+    # As many names as fit into a line, at least one, and how many more there are.
+    for shown in range(len(ordered), 0, -1):
+        more = "" if shown == len(ordered) else f", {len(ordered) - shown} more"
+        listed = f"{shlex.quote(folder)}: {', '.join(ordered[:shown])}{more}"
+        if width is None or len(listed) <= width:
+            break
+    return [*lines, listed]
 
 
 def notes_line(notes: Sequence[str]) -> str:
@@ -98,24 +111,3 @@ def notes_line(notes: Sequence[str]) -> str:
             return f"note: {line}"
     rest = f"; {len(parts) - 1} more" if len(parts) > 1 else ""
     return f"note: {parts[0]}{rest}" + ("; -v lists them" if rest else "") if parts else ""
-
-
-def _some(names: Sequence[str]) -> str:
-    """Return up to three names, and how many more there are."""
-    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-    return ", ".join(names[:3]) + more
-
-
-def _listed(head: str, parts: Sequence[str], width: int | None) -> str:
-    """Return as many parts as fit into a line, at least one, and how many more there are."""
-    for count in range(len(parts), 1, -1):
-        more = "" if count == len(parts) else f", {len(parts) - count} more"
-        line = f"{head}{', '.join(parts[:count])}{more}"
-        if width is None or len(line) <= width:
-            return line
-    return f"{head}{parts[0]}" + (f", {len(parts) - 1} more" if len(parts) > 1 else "")
-
-
-def _clipped(line: str, width: int | None) -> str:
-    """Return a line, a long one cut after a word that leaves room for dots."""
-    return line if width is None or len(line) <= width else line[: width - 3].rpartition(" ")[0].rstrip(",;(") + " ..."

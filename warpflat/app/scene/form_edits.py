@@ -5,7 +5,6 @@ An edit returns another scene. Both are run, and their energies lie side by side
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -172,8 +171,28 @@ def turn_dart(scene: Scene, dart: str, into: str, garment: FormGarment) -> Scene
     if into == "pleat":
         pleat = cut_of_dart(replace(old, pleat_mm=PLEAT_MM))
         return scene_with(scene, cuts=[*_cuts_without(scene, old, keep=True), pleat])
+    # The edges at the mouths of the dart and of its mirror image, and how wide these are.
+    sewn, taken = plan_form(form).seams, dict[tuple[str, str], float]()
+    for placed in form.darts:
+        if placed.asked.place == old.place and (placed.piece, placed.name) in form.legs():
+            piece, positions = form.pieces[placed.piece], garment.pieces[placed.piece].positions
+            left, right = (piece.edges[leg] for leg in piece.darts[placed.name])
+            edge = next(own for own, ids in piece.edges.items() if ids[-1] == left[0])
+            edge, width = piece.whole(edge), polyline_length(positions[[left[0], right[-1]]])
+            taken[placed.piece, edge] = taken.get((placed.piece, edge), 0.0) + width
+    # By seam the piece of the edge, and the share of the edge that they take in.
+    shares: dict[str, tuple[str, float]] = {}
+    for (longer, edge), width in taken.items():
+        piece = form.pieces[longer]
+        parts = [part for part in piece.edges if piece.whole(part) == edge]
+        length = sum(polyline_length(garment.pieces[longer].positions[piece.edges[part]]) for part in parts)
+        sides = ((s.name, side) for s in sewn for side in s.stretches)
+        name = next((own for own, side in sides if side.piece == longer and side.edge in parts), None)
+        if name is None:
+            raise InputError(f"dart {longer}.{old.name}: its mouth lies on {edge!r}, which is sewn to nothing")
+        shares[name] = longer, width / length
     seams = [table.given() for table in scene.settings.seams]
-    for name, (longer, share) in _shares(old, garment).items():
+    for name, (longer, share) in shares.items():
         how = {"fullness": round(share, 4)} if into == "ease" else {"gather": round(1.0 + share, 4)}
         if into == "ease" and share > 0.3:
             raise InputError(
@@ -206,31 +225,3 @@ def _cuts_without(scene: Scene, dart: FormDart, *, keep: bool = False) -> list[d
     if dart.place in shaped and not keep:
         cuts.append(omitted(dart, name=dart.name))
     return cuts
-
-
-def _shares(dart: FormDart, garment: FormGarment) -> Mapping[str, tuple[str, float]]:
-    """Return by seam at the mouths of a dart and its mirror image the edge, and the share of it that they take in."""
-    form = garment.form
-    seams = plan_form(form).seams
-    taken: dict[tuple[str, str], float] = {}
-    for placed in form.darts:
-        if placed.asked.place == dart.place and (placed.piece, placed.name) in form.legs():
-            # The edge on which its mouth lies, and how wide that is.
-            piece, positions = form.pieces[placed.piece], garment.pieces[placed.piece].positions
-            left, right = (piece.edges[leg] for leg in piece.darts[placed.name])
-            edge = next(name for name, ids in piece.edges.items() if ids[-1] == left[0])
-            edge, width = piece.whole(edge), polyline_length(positions[[left[0], right[-1]]])
-            taken[placed.piece, edge] = taken.get((placed.piece, edge), 0.0) + width
-    found = {}
-    for (name, edge), width in taken.items():
-        piece = form.pieces[name]
-        parts = [part for part in piece.edges if piece.whole(part) == edge]
-        length = sum(polyline_length(garment.pieces[name].positions[piece.edges[part]]) for part in parts)
-        seam = next(
-            (s.name for s in seams if any(side.piece == name and side.edge in parts for side in s.stretches)),
-            None,
-        )
-        if seam is None:
-            raise InputError(f"dart {name}.{dart.name}: its mouth lies on {edge!r}, which is sewn to nothing")
-        found[seam] = (name, width / length)
-    return found

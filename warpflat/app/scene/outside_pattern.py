@@ -154,16 +154,19 @@ class OutsideJob:
                     seams = []
                     for number, entry in enumerate(table.seams, start=1):
                         name = entry.name or f"seam {number}"
-                        first, second = (
+                        one, other = (
                             tuple(_side(text.strip(), reversed=k == 1) for text in side.split(" + "))
                             for k, side in enumerate(entry.sides)
                         )
-                        seams.append(Seam(name=name, sides=(first, second)))
+                        seams.append(Seam(name=name, sides=(one, other)))
                 pattern = replace(pattern, pieces=pieces, seams=seams)
             if not pattern.seams:
+                first, *others = pattern.pieces[pattern.sample]
+                second = others[0] if others else first
                 raise InputError(
                     f"{path}: names no seams; give --seams FILE with [[seams]] sides = "
-                    f"[{', '.join(_examples(pattern))}] (warpflat drape {path.name} --edges prints all edges)"
+                    f'["{first.name}.{first.edges[0].name}", "{second.name}.{second.edges[-1].name}"] '
+                    f"(warpflat drape {path.name} --edges prints all edges)"
                 )
             worn = _worn_scan(body, table, lifts, pattern) if lifts and run_body is None else None
             mannequin, lifts = worn or (_body(body, table, run_body, path, designed=bool(lifts)), lifts)
@@ -248,12 +251,6 @@ def _side(text: str, *, reversed: bool) -> Any:
     piece, edge = piece.removesuffix(MIRRORED), edge.removesuffix(MIRRORED)
     # A mirrored edge runs the other way than the one that it is an image of.
     return SeamSide(piece=piece, edge=edge, reversed=reversed != mirrored, mirrored=mirrored)
-
-
-def _examples(pattern: Pattern) -> list[str]:
-    pieces = list(pattern.pieces[pattern.sample])
-    second = pieces[1] if len(pieces) > 1 else pieces[0]
-    return [f'"{pieces[0].name}.{pieces[0].edges[0].name}"', f'"{second.name}.{second.edges[-1].name}"']
 
 
 def _asked(given: str | None, table: SewingTable) -> MannequinTable | None:

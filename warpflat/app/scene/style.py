@@ -114,7 +114,19 @@ def with_style(tables: Mapping[str, Any], style: Mapping[str, str], garment: str
             found = laid_over(found, {"ease": {eased[name]: _number(key, text, -30.0, 100.0)}})
             continue
         if key.startswith("hem-"):
-            found = _with_risen_hem(found, key, text, garment)
+            if "hem-LINE" not in known:
+                raise InputError(f"--{key} makes no sense on a {garment}: {_why_not(found, key)}")
+            part = _body_part(_form(found))
+            line, edge = key.removeprefix("hem-").replace("-", " "), _line_of(_hem(_form(found), part), part)
+            if line not in _HEM_LINES[part]:
+                raise InputError(f"--{key} makes no sense on a {garment}: {nearest(line, _HEM_LINES[part])}")
+            wishes = [*found.get("finishing", ())]
+            risen = next((wish for wish in wishes if wish["kind"] == "hem" and wish["edge"] == edge), None)
+            # The other lines stay where they are, until they are named.
+            rises = dict.fromkeys(_HEM_LINES[part], 0.0) if risen is None else dict(risen["shorten_mm"])
+            rises[line] = 10.0 * _number(key, text, 0.0, 80.0)
+            kept = [wish for wish in wishes if wish is not risen]
+            found = {**found, "finishing": [*kept, {"kind": "hem", "edge": edge, "shorten_mm": rises}]}
             continue
         if key not in STYLE_KEYS:
             raise InputError(f"a {garment} has no choice {key!r}: {nearest(key, known)}")
@@ -241,23 +253,6 @@ def _number(key: str, text: str, low: float, high: float) -> float:
     if not low <= value <= high:
         raise InputError(f"--{key} {text}: a number from {low:g} to {high:g} [cm] is needed")
     return value
-
-
-def _with_risen_hem(tables: dict[str, Any], key: str, text: str, garment: str) -> dict[str, Any]:
-    """Return tables with a hem that lies higher where one of its lines meets it; elsewhere as before, or as at other such lines."""
-    if "hem-LINE" not in style_options(tables):
-        raise InputError(f"--{key} makes no sense on a {garment}: {_why_not(tables, key)}")
-    part = _body_part(_form(tables))
-    line, edge = key.removeprefix("hem-").replace("-", " "), _line_of(_hem(_form(tables), part), part)
-    if line not in _HEM_LINES[part]:
-        raise InputError(f"--{key} makes no sense on a {garment}: {nearest(line, _HEM_LINES[part])}")
-    wishes = [*tables.get("finishing", ())]
-    own = next((wish for wish in wishes if wish["kind"] == "hem" and wish["edge"] == edge), None)
-    # The other lines stay where they are, until they are named.
-    rises = dict.fromkeys(_HEM_LINES[part], 0.0) if own is None else dict(own["shorten_mm"])
-    rises[line] = 10.0 * _number(key, text, 0.0, 80.0)
-    kept = [wish for wish in wishes if wish is not own]
-    return {**tables, "finishing": [*kept, {"kind": "hem", "edge": edge, "shorten_mm": rises}]}
 
 
 def _with_length(tables: dict[str, Any], key: str, text: str) -> dict[str, Any]:

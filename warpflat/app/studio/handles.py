@@ -140,22 +140,6 @@ def _with_darts(plan: GarmentPlan, *darts: FormDart) -> dict[str, Any]:
     return {"cuts": cuts}
 
 
-def _held_darts(solution: Solution, level: str) -> list[FormDart]:
-    """Return the darts that are widest at a level and as wide as the cloth wants, each as wide as it is now."""
-    plan, held = solution.plan, dict[tuple[str | None, ...], FormDart]()
-    assert plan is not None
-    row = plan.mannequin.layout.lines.get(level, ())
-    for name, piece in plan.form.pieces.items():
-        flat = np.asarray(solution.pieces[name].positions)
-        placed = {dart.name: dart.asked for dart in plan.form.darts if dart.piece == name}
-        for dart_name, (left, right) in piece.legs().items():
-            asked, apart = placed[dart_name], np.linalg.norm(flat[left] - flat[right], axis=1)
-            mouth = int(apart.argmax()) if dart_name in piece.fisheyes else 0
-            if asked.mouth_mm is None and asked.pleat_mm is None and piece.grid_vertices[left[mouth]] in row:
-                held[asked.place] = replace(asked, mouth_mm=round(1e3 * float(apart[mouth]), 1), like=None)
-    return list(held.values())
-
-
 def _of_sides(solution: Solution, plan: GarmentPlan, name: str, flat: FloatArray) -> Iterator[Handle]:
     """A point of a side seam at a level gives the garment more or less ease there; darts there stay as wide as they are."""
     piece, layout = plan.form.pieces[name], plan.mannequin.layout
@@ -164,8 +148,17 @@ def _of_sides(solution: Solution, plan: GarmentPlan, name: str, flat: FloatArray
 
     def change(level: str, ease: float, share: float, moved: float) -> dict[str, Any]:
         # Left free, the darts would close by as much as the cloth grows, and the seam would hardly move.
-        held = _held_darts(solution, level)
-        cuts = _with_darts(plan, *held) if held else {}
+        held, row = dict[tuple[str | None, ...], FormDart](), layout.lines.get(level, ())
+        for own, form in plan.form.pieces.items():
+            lies = np.asarray(solution.pieces[own].positions)
+            placed = {dart.name: dart.asked for dart in plan.form.darts if dart.piece == own}
+            for dart_name, (left, right) in form.legs().items():
+                dart, apart = placed[dart_name], np.linalg.norm(lies[left] - lies[right], axis=1)
+                mouth = int(apart.argmax()) if dart_name in form.fisheyes else 0
+                # Those that are widest at the level, and as wide as the cloth wants.
+                if dart.mouth_mm is None and dart.pleat_mm is None and form.grid_vertices[left[mouth]] in row:
+                    held[dart.place] = replace(dart, mouth_mm=round(1e3 * float(apart[mouth]), 1), like=None)
+        cuts = _with_darts(plan, *held.values()) if held else {}
         return {**cuts, "ease": {**table, level: round(ease + 100.0 * moved / share, 1)}}
 
     for edge, ids in piece.edges.items():

@@ -181,7 +181,13 @@ class Page:
                     self._seen, self._shown_size = tuple(solution.pieces), size
                     for client in self.server.get_clients().values():
                         self.stage.show_all(client)
-                self._show_handles(solution)
+                # While a cut is only tried, nothing can be dragged in the pattern.
+                if self.session.preview is not None:
+                    self._handles = None, {}
+                elif self._handles[0] is not solution:
+                    self._handles = solution, {f"{each.piece}: {each.name}": each for each in pattern_handles(solution)}
+                known = self._handles[1]
+                self.stage.show_handles({name: (each.piece, each.place) for name, each in known.items()}, self._drag)
         if self._told:
             self._told = False
             self._update_panel()
@@ -213,15 +219,6 @@ class Page:
                 for name, frame in frames.items()
             }
         return {name: Shown.of_map(frame, kind, lines[name], angle) for name, frame in frames.items()}
-
-    def _show_handles(self, solution: Solution) -> None:
-        """Show what can be dragged in the pattern that is shown; nothing while a cut is only tried."""
-        if self.session.preview is not None:
-            self._handles = None, {}
-        elif self._handles[0] is not solution:
-            self._handles = solution, {f"{each.piece}: {each.name}": each for each in pattern_handles(solution)}
-        known = self._handles[1]
-        self.stage.show_handles({name: (each.piece, each.place) for name, each in known.items()}, self._drag)
 
     async def _drag(self, name: str, event: viser.SceneNodeDragEvent[Any]) -> None:
         """Take a handle where the pointer is; awaited by the server, so that the parts of a drag keep their order."""

@@ -11,9 +11,7 @@ from warpflat.app.review.figures import relaxation_words
 from warpflat.app.scene.load import scene_library
 from warpflat.app.scene.schema import SceneTable
 from warpflat.app.studio.maps import MAPS, MapScale
-from warpflat.app.studio.save import Saved
 from warpflat.app.studio.session import Preview, Session
-from warpflat.app.studio.solve import Solution
 from warpflat.core import InputError, energy_words
 from warpflat.flat import load_library
 from warpflat.garment import EASE_PRESETS, form_names, size_names, size_tables
@@ -219,7 +217,11 @@ def _head(session: Session) -> str:
             rows = f"<table style='width:100%;line-height:1.15'>{cells}</table>"
     lines = [" · ".join(words), rows]
     if solution is not None:
-        lines += [_fit_words(solution), escape("; ".join(solution.notes))]
+        if (verdict := solution.verdict) is not None:
+            failing = [finding.words for finding in verdict.findings if finding.fails]
+            colour = "" if verdict.fits else " style='color:#b00020'"
+            lines.append(": ".join([f"<b{colour}>{escape(verdict.words)}</b>", *map(escape, failing[:1])]))
+        lines.append(escape("; ".join(solution.notes)))
         lines.append(
             relaxation_words([stage.as_dict() for stage in piece.stages] for piece in solution.pieces.values())
         )
@@ -237,31 +239,14 @@ def _head(session: Session) -> str:
         state = "at rest" if session.saved.at_rest else "NOT at rest"
         lines.append(f"run from scratch: strain energy <b>{energy_words(session.saved.strain_energy)}</b>, {state}")
     if session.saved is not None:
-        lines.append(_links(session.saved))
+        # What was saved last is there to print, to review and to download.
+        files, opened = session.saved.files, [("pattern.pdf", "print"), ("review.html", "review")]
+        links = [(file, title, "target='_blank'") for file, title in opened if file in files]
+        links += [(file, file, "download") for file in files]
+        saved = [f"<a href='saved/{quote(file)}' {how}>{escape(title)}</a>" for file, title, how in links]
+        lines.append(f"<span id='studio-links'>{escape(session.saved.path.stem)}: {' · '.join(saved)}</span>")
     text = "".join(f"<div style='margin-bottom:0.2em'>{line}</div>" for line in lines if line)
     return f"<div id='studio-head' style='padding:0.3em 0.9em;font-size:0.9em;overflow-wrap:anywhere'>{text}</div>"
-
-
-def _fit_words(solution: Solution) -> str:
-    """Return the verdict on the solution; nothing while that is not known."""
-    verdict = solution.verdict
-    if verdict is None:
-        return ""
-    failing = [finding.words for finding in verdict.findings if finding.fails]
-    colour = "" if verdict.fits else " style='color:#b00020'"
-    return ": ".join([f"<b{colour}>{escape(verdict.words)}</b>", *map(escape, failing[:1])])
-
-
-def _links(saved: Saved) -> str:
-    """Return links to what was saved last: to print, to review, to download."""
-
-    def link(file: str, words: str, how: str) -> str:
-        return f"<a href='saved/{quote(file)}' {how}>{escape(words)}</a>"
-
-    opened = [("pattern.pdf", "print"), ("review.html", "review")]
-    links = [link(file, words, "target='_blank'") for file, words in opened if file in saved.files]
-    links += [link(file, file, "download") for file in saved.files]
-    return f"<span id='studio-links'>{escape(saved.path.stem)}: {' · '.join(links)}</span>"
 
 
 def preview_words(preview: Preview) -> str:

@@ -122,7 +122,12 @@ def solve(
         else:
             form = scene_form(one, mannequin, before=None if last is None else last.form)[1]
         plan = last = plan_garment(one, built=(mannequin, form))
-        garment = plan.flatten(callback=callback, known=_known(plan, before))
+        # Pieces that were flattened as the plan asks are known as they lay at rest before they were sewn.
+        at_rest = dict[str, Flattening]()
+        if before is not None and before.plan is not None and before.plan.settings == plan.settings:
+            unsewn = {name: piece.unsewn for name, piece in before.pieces.items() if name in plan.form.pieces}
+            at_rest = {name: piece for name, piece in unsewn.items() if piece is not None and piece.converged}
+        garment = plan.flatten(callback=callback, known=at_rest)
         require_open_darts(one, [garment])
         return plan, garment
 
@@ -147,14 +152,6 @@ def _one_more_cut(scene: Scene, before: Solution, sequence: CutSequence) -> CutP
     ):
         return None
     return sequence.plans[-1]
-
-
-def _known(plan: GarmentPlan, before: Solution | None) -> dict[str, Flattening]:
-    """Return the pieces of another solution as they lay at rest before they were sewn, if they were flattened as the plan asks."""
-    if before is None or before.plan is None or before.plan.settings != plan.settings:
-        return {}
-    unsewn = {name: piece.unsewn for name, piece in before.pieces.items() if name in plan.form.pieces}
-    return {name: piece for name, piece in unsewn.items() if piece is not None and piece.converged}
 
 
 def _alike(one: Scene, other: Scene, keys: tuple[str, ...] | list[str]) -> bool:

@@ -108,7 +108,7 @@ class Stage:
             self.lay_out(pieces)
         self._pieces = dict(pieces)
         space, flat, triangles, colours = [], [], [], []
-        edges: list[FloatArray] = []
+        edges, grains = list[FloatArray](), list[FloatArray]()
         count = 0
         for name, piece in pieces.items():
             corners, _ = triangulate(piece.frame.surface.faces)
@@ -118,6 +118,17 @@ class Stage:
             colours.append(scale.rgb(piece.values))
             edges.append(flat[-1][border_edges(piece.frame.surface.faces)])
             count += len(piece.space)
+            # An arrow along the warp in the middle of the piece. Warp runs along +y, turned counter-clockwise.
+            middle, size = 0.5 * (flat[-1].min(axis=0) + flat[-1].max(axis=0)), np.ptp(flat[-1], axis=0)
+            angle = np.radians(piece.grain_angle)
+            along = np.array([-np.sin(angle), np.cos(angle), 0.0])
+            across = np.array([np.cos(angle), np.sin(angle), 0.0])
+            reach, barb = 0.18 * float(size[:2].min()), 0.04 * float(size[:2].min())
+            arrow = [[-reach * along, reach * along]]
+            for end in (1.0, -1.0):
+                tip = end * reach * along
+                arrow += [[tip, tip - end * barb * along + side * 0.5 * barb * across] for side in (1.0, -1.0)]
+            grains.append(np.array(arrow) + middle + [0.0, 0.0, 2.0 * _ABOVE])
         shared = np.concatenate(triangles), np.concatenate(colours)
         with self._server.atomic():
             self._mesh("/form/cloth", np.concatenate(space), *shared, lit=True)
@@ -128,9 +139,7 @@ class Stage:
             # Lines lie a little above the cloth, so that they are seen.
             lifted = self._line_pairs(pieces, lambda _, piece: _above(piece.space, piece.frame.surface.faces, _ABOVE))
             self._segments("/form/lines", _joined(lifted), _INK, 1.5)
-            self._segments(
-                "/pattern/grain", _joined(self._grain(name, piece) for name, piece in pieces.items()), _INK, 2.0
-            )
+            self._segments("/pattern/grain", _joined(grains), _INK, 2.0)
 
     def write_names(self, names: Mapping[str, str]) -> None:
         """Write each piece's name below its pattern, and a bar of ten centimetres at the end of the table.
@@ -304,20 +313,6 @@ class Stage:
             for ids in piece.lines.values():
                 row = at[ids] + [0.0, 0.0, 0.5 * _ABOVE if places == self._flat else 0.0]
                 yield np.stack([row[:-1], row[1:]], axis=1)
-
-    def _grain(self, name: str, piece: Shown) -> FloatArray:
-        """Return an arrow along the warp in the middle of a piece, #S by 2 by 3 [m]."""
-        flat = self._flat(name, piece)
-        middle, size = 0.5 * (flat.min(axis=0) + flat.max(axis=0)), np.ptp(flat, axis=0)
-        angle = np.radians(piece.grain_angle)
-        # Warp runs along +y, turned counter-clockwise.
-        along, across = np.array([-np.sin(angle), np.cos(angle), 0.0]), np.array([np.cos(angle), np.sin(angle), 0.0])
-        reach, barb = 0.18 * float(size[:2].min()), 0.04 * float(size[:2].min())
-        arrow = [[-reach * along, reach * along]]
-        for end in (1.0, -1.0):
-            tip = end * reach * along
-            arrow += [[tip, tip - end * barb * along + side * 0.5 * barb * across] for side in (1.0, -1.0)]
-        return np.asarray(np.array(arrow) + middle + [0.0, 0.0, 2.0 * _ABOVE])
 
     def _mesh(self, node: str, vertices: FloatArray, triangles: IntArray, colours: FloatArray, *, lit: bool) -> None:
         data = coloured_mesh(vertices, triangles, colours, lit=lit)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.flat.cutting.cut_piece import cut
 from warpflat.flat.cutting.cut_plan import CutPlan, carry_layout, make_cuts
@@ -18,10 +17,8 @@ from warpflat.flat.flattening.progress import Progress
 from warpflat.flat.flattening.result import Flattening
 from warpflat.flat.solver.options import RelaxOptions, given_options
 from warpflat.flat.surface.cells import LEAST_AREA
-from warpflat.flat.surface.cut.crack import Crack
 from warpflat.flat.surface.cut.dart import dart_measure
 from warpflat.flat.surface.falloff import harmonic_values
-from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.untangle import untangle
 
 __all__ = ["DartMove", "move_dart"]
@@ -77,7 +74,15 @@ def move_dart(
     others = [CutPlan.from_applied(made) for made in both.cuts if made.name != close]
     made = make_cuts(both.surface, others)
     closing = [seam for one in both.cuts if one.name == close for seam in one.seams]
-    drawn = _close_cracks(both.network.surface, both.positions, closing)
+    # Both sides of its cracks move to the middle between them, and all else harmonically with them; pieces without a crack stay.
+    shift = np.zeros_like(both.positions)
+    fixed = np.zeros(len(shift), dtype=bool)
+    for seam in closing:
+        middle = 0.5 * (both.positions[seam.left] + both.positions[seam.right])
+        for side in (seam.left, seam.right):
+            shift[side] = middle - both.positions[side]
+            fixed[side] = True
+    drawn = both.positions + harmonic_values(both.network.surface.faces, shift, fixed)
     positions = carry_layout(drawn, both.faces, made.surface.faces, len(made.surface.vertices))
     # Faces that this has folded are untangled before the relaxation; if they cannot be, the piece is developed anew.
     positions, folded = untangle(made.surface, positions, least_area=LEAST_AREA)
@@ -102,19 +107,6 @@ def move_dart(
         angle_before=_angle_of(result, close),
         angle_after=_angle_of(after, plan.name),
     )
-
-
-def _close_cracks(surface: Surface, positions: FloatArray, seams: Sequence[Crack]) -> FloatArray:
-    """Move both sides of cracks to the middle between them, and everything else along harmonically; return the layout."""
-    shift = np.zeros_like(positions)
-    fixed = np.zeros(len(positions), dtype=bool)
-    for seam in seams:
-        middle = 0.5 * (positions[seam.left] + positions[seam.right])
-        for side in (seam.left, seam.right):
-            shift[side] = middle - positions[side]
-            fixed[side] = True
-    # Pieces that no crack touches stay.
-    return positions + harmonic_values(surface.faces, shift, fixed)
 
 
 def _angle_of(result: Flattening, name: str) -> float:

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.flat.cutting.cut_plan import CutPlan, CutSurface, make_cuts
 from warpflat.flat.cutting.refine_piece import network_on_faces
 from warpflat.flat.flattening.result import Flattening
@@ -98,6 +97,23 @@ def _part(result: Flattening, piece: CutPart) -> Flattening:
             paths = tuple(seam.path for seam in seams)
             cuts.append(replace(made, seams=seams, paths=paths, length=path_length(glued, paths)))
     datum = glued.lines.get(result.datum_name, np.empty(0, dtype=np.int32))
+    has_line = len(datum) > 1
+    if not has_line:
+        # What the part has of the whole's datum, so that the grain of its layout stays when it is relaxed further.
+        own = number[result.datum]
+        runs = np.split(own, np.flatnonzero((own[1:] < 0) | (own[:-1] < 0)) + 1)
+        datum = max((run for run in runs if run[0] >= 0), key=len, default=own[:0])
+    if len(datum) <= 1:
+        # Else a way through it that runs as upright. All places of a fine mesh would make millions of pairs.
+        border, layout = border_of(glued), positions[: len(used)]
+        loop = border[:: len(border) // _ENDS + 1]
+        way = layout[loop] - layout[loop][:, None]
+        # Of the chords that are half as tall as the part.
+        tall = way[..., 1] >= 0.5 * np.ptp(layout[:, 1])
+        low, high = np.unravel_index(
+            np.where(tall, np.abs(way[..., 0]) / np.where(tall, way[..., 1], 1.0), np.inf).argmin(), tall.shape
+        )
+        datum = EdgeGraph(glued).path(int(loop[low]), int(loop[high]))
     energies = Relaxation(network, RelaxOptions(), start=positions).energies()
     last = replace(
         result.stages[-1],
@@ -110,37 +126,11 @@ def _part(result: Flattening, piece: CutPart) -> Flattening:
         surface=glued,
         network=network,
         positions=positions,
-        datum=datum if len(datum) > 1 else _upright(glued, positions[: len(used)], number[result.datum]),
-        datum_name=result.datum_name if len(datum) > 1 else "datum",
+        datum=datum,
+        datum_name=result.datum_name if has_line else "datum",
         development=replace(result.development, positions=result.development.positions[used]),
         stages=(*result.stages[:-1], last),
         cuts=tuple(cuts),
         close=None if result.close is None else result.close[piece.face_index],
         unsewn=None if result.unsewn is None else _part(result.unsewn, piece),
     )
-
-
-def _upright(surface: Surface, positions: FloatArray, datum: IntArray) -> IntArray:
-    """Return the datum of a part that has no line of its name: what it has of the whole's, else a way through it that runs as upright.
-
-    So the grain of its layout stays when it is relaxed further.
-
-    Args:
-        surface: the part.
-        positions: #V by 2, its layout [m].
-        datum: the whole's, in the part's numbers, -1 outside it.
-    """
-    runs = np.split(datum, np.flatnonzero((datum[1:] < 0) | (datum[:-1] < 0)) + 1)
-    longest = max((run for run in runs if run[0] >= 0), key=len, default=datum[:0])
-    if len(longest) > 1:
-        return longest
-    # All places of a fine mesh would make millions of pairs.
-    border = border_of(surface)
-    loop = border[:: len(border) // _ENDS + 1]
-    way = positions[loop] - positions[loop][:, None]
-    # Of the chords that are half as tall as the part.
-    tall = way[..., 1] >= 0.5 * np.ptp(positions[:, 1])
-    low, high = np.unravel_index(
-        np.where(tall, np.abs(way[..., 0]) / np.where(tall, way[..., 1], 1.0), np.inf).argmin(), tall.shape
-    )
-    return EdgeGraph(surface).path(int(loop[low]), int(loop[high]))

@@ -141,7 +141,28 @@ def gradient(pattern: Flattening, of: str | Sequence[int] | Scalar) -> Gradient:
     if connected_components(around.matrix, directed=False)[0] > 1:
         raise InputError(f"piece {pattern.surface.name!r} is in several parts: no gradient; use `warpflat.separate`")
     scalar, chord = _scalar(pattern, of), (int(pattern.datum[0]), int(pattern.datum[-1]))
-    positions = _exact_minimum(pattern, around, chord)
+    start = np.array(pattern.positions)
+    start[chord[1], 0] = start[chord[0], 0]
+    energy = Energy(Relaxation(network, RelaxOptions(), start=start))
+    enough = _NEGLIGIBLE * float(network.spring_arrays.rest_length.mean())
+    point = energy.at(start)
+    positions: FloatArray | None = None
+    for _ in range(_MOST_STEPS):
+        step = _solve(_stiffness(network, point.positions, around), chord, -point.gradient)
+        if abs(step).max() <= enough:
+            positions = np.asarray(point.positions + step)
+            break
+        # Close to rest the energy falls by less than its rounding.
+        whole = energy.at(point.positions + step)
+        found = None if whole.energy <= (1.0 + _ROUNDING) * point.energy else line_search(energy.at, point, step)[0]
+        point = found or whole
+        if not np.isfinite(point.energy):
+            break
+    if positions is None:
+        raise InputError(
+            f"piece {pattern.surface.name!r} is not near enough to a minimum for a gradient ({_MOST_STEPS} Newton steps left a step of "
+            f"{1e3 * abs(step).max():.2g} mm): flatten it with a smaller energy_tolerance"
+        )
     value, slope = scalar(positions)
     adjoint = _solve(_stiffness(network, positions, around), chord, np.asarray(slope, dtype=np.float64))
     return Gradient(
@@ -280,30 +301,3 @@ def _solve(stiffness: csc_array, chord: tuple[int, int], right: FloatArray) -> F
     matrix = csc_array(block_array([[stiffness, rows.T], [rows, None]]))
     found = splu(matrix).solve(np.concatenate([right.ravel(), np.zeros(3)]))
     return np.asarray(found[:-3]).reshape(-1, 2)
-
-
-def _exact_minimum(pattern: Flattening, around: _Neighbours, chord: tuple[int, int]) -> FloatArray:
-    """Take Newton steps from the pattern until they move it by next to nothing.
-
-    Raises:
-        InputError: they do not get there.
-    """
-    network, positions = pattern.network, np.array(pattern.positions)
-    positions[chord[1], 0] = positions[chord[0], 0]
-    energy = Energy(Relaxation(network, RelaxOptions(), start=positions))
-    enough = _NEGLIGIBLE * float(network.spring_arrays.rest_length.mean())
-    point = energy.at(positions)
-    for _ in range(_MOST_STEPS):
-        step = _solve(_stiffness(network, point.positions, around), chord, -point.gradient)
-        if abs(step).max() <= enough:
-            return np.asarray(point.positions + step)
-        # Close to rest the energy falls by less than its rounding.
-        whole = energy.at(point.positions + step)
-        found = None if whole.energy <= (1.0 + _ROUNDING) * point.energy else line_search(energy.at, point, step)[0]
-        point = found or whole
-        if not np.isfinite(point.energy):
-            break
-    raise InputError(
-        f"piece {pattern.surface.name!r} is not near enough to a minimum for a gradient ({_MOST_STEPS} Newton steps left a step of "
-        f"{1e3 * abs(step).max():.2g} mm): flatten it with a smaller energy_tolerance"
-    )

@@ -95,10 +95,42 @@ def judge(metrics: Mapping[str, Any]) -> Verdict | None:
     if drape is None and not worn:
         return None
     if drape is not None:
-        found += _draped(drape)
+        if not drape["converged"]:
+            found.append(
+                Finding(
+                    kind="not at rest",
+                    fails=True,
+                    words="the draped cloth is not at rest",
+                    remedy="allow it more steps",
+                )
+            )
+        # Its places are the worst first.
+        for place in drape["places"][:_MOST_PLACES]:
+            kind: Kind = "held" if place["kind"] in ("strain", "shear") else "misfit"
+            found.append(Finding(kind=kind if place["fails"] else "folds", fails=place["fails"], words=place["words"]))
     else:
         found += _held(metrics["wear"], worn, {name: float(metrics["pieces"][name]["area_m2"]) for name in worn})
-        found += _on_the_wearer(metrics["wear"].get("wearer") or {})
+        # What the strain around the body tells where the garment is smaller than it.
+        wearer = metrics["wear"].get("wearer") or {}
+        worst, pressure = wearer.get("most_stretched"), wearer.get("pressure_pa")
+        if worst is not None and worst["strain"] > wearer["strain_limit"]:
+            found.append(
+                Finding(
+                    kind="held",
+                    fails=True,
+                    words=f"stretched by {100 * worst['strain']:.1f} % around the body, {worst['place']}, beyond the cloth's limit",
+                    remedy="give more ease there, or choose a stretchier cloth",
+                )
+            )
+        if pressure is not None and pressure["p95"] > _COMFORT:
+            found.append(
+                Finding(
+                    kind="pressing",
+                    fails=True,
+                    words=f"presses with {pressure['p95']:,.0f} Pa, most {pressure['place']}; {_COMFORT:,.0f} Pa are felt as too tight",
+                    remedy="give more ease there, or choose a softer cloth",
+                )
+            )
     found += _girths(metrics.get("girths") or {})
     found += [
         Finding(
@@ -150,31 +182,6 @@ def _held(
     return found
 
 
-def _on_the_wearer(wearer: Mapping[str, Any]) -> list[Finding]:
-    """Return what the strain around the body tells where the garment is smaller than it."""
-    found, worst = [], wearer.get("most_stretched")
-    if worst is not None and worst["strain"] > wearer["strain_limit"]:
-        found.append(
-            Finding(
-                kind="held",
-                fails=True,
-                words=f"stretched by {100 * worst['strain']:.1f} % around the body, {worst['place']}, beyond the cloth's limit",
-                remedy="give more ease there, or choose a stretchier cloth",
-            )
-        )
-    pressure = wearer.get("pressure_pa")
-    if pressure is not None and pressure["p95"] > _COMFORT:
-        found.append(
-            Finding(
-                kind="pressing",
-                fails=True,
-                words=f"presses with {pressure['p95']:,.0f} Pa, most {pressure['place']}; {_COMFORT:,.0f} Pa are felt as too tight",
-                remedy="give more ease there, or choose a softer cloth",
-            )
-        )
-    return found
-
-
 def _girths(girths: Mapping[str, Mapping[str, float]]) -> list[Finding]:
     """Return levels at which the garment is larger than it was drafted, and those whose ease is not the one asked for."""
     found = []
@@ -197,19 +204,4 @@ def _girths(girths: Mapping[str, Mapping[str, float]]) -> list[Finding]:
         elif asked is not None and abs(ease - asked) > _EASE_MISSED:
             words = f"ease: {name} {100 * ease:+.1f} cm, {100 * asked:+.1f} asked for"
             found.append(Finding(kind="ease", fails=False, words=words))
-    return found
-
-
-def _draped(drape: Mapping[str, Any]) -> list[Finding]:
-    """Return what a drape tells; its places are the worst first."""
-    found = []
-    if not drape["converged"]:
-        found.append(
-            Finding(
-                kind="not at rest", fails=True, words="the draped cloth is not at rest", remedy="allow it more steps"
-            )
-        )
-    for place in drape["places"][:_MOST_PLACES]:
-        kind: Kind = "held" if place["kind"] in ("strain", "shear") else "misfit"
-        found.append(Finding(kind=kind if place["fails"] else "folds", fails=place["fails"], words=place["words"]))
     return found

@@ -142,24 +142,7 @@ def step_matrix(
         #C by 3, weights of the cell's edges 0-1, 1-2, 2-0, and #C by 3, their sums at its corners.
     """
     det = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
-    turned = _gradients_in_cloth(corner, edges, det, positions)
-    along = np.stack([turned @ axes[0], turned @ axes[1]], axis=-1) * stretch[:, None, :]
-    c_warp, c_weft, c_cross = plane_stress(fabric)
-    shear = 2.0 * fabric.shear_stiffness
-    conductivity = np.array([max(c_warp + c_cross, shear), max(c_weft + c_cross, shear)])
-    flat = np.where(det > 0.0, area / (stretch[:, 0] * stretch[:, 1]), 0.0)
-    weights = np.stack(
-        [np.maximum(-flat * ((along[:, i] * along[:, j]) @ conductivity), 0.0) for i, j in ((0, 1), (1, 2), (2, 0))],
-        axis=1,
-    )
-    return weights, corner_sums(weights)
-
-
-def _gradients_in_cloth(corner: IntArray, edges: FloatArray, det: FloatArray, positions: FloatArray) -> FloatArray:
-    """Return the gradients of the corners' barycentric weights in the plane of the cloth, #C by 3 by 2 [1/m].
-
-    Each cell keeps its shape on the body and has the rotation it has in the layout.
-    """
+    # Each cell keeps its shape on the body and has the rotation that it has in the layout.
     p = positions[corner]
     D = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=-1)
     safe = np.where(det > 0.0, det, 1.0)
@@ -175,17 +158,27 @@ def _gradients_in_cloth(corner: IntArray, edges: FloatArray, det: FloatArray, po
     )
     turn = D @ inverse
     angle = np.arctan2(turn[:, 1, 0] - turn[:, 0, 1], turn[:, 0, 0] + turn[:, 1, 1])
-    # Rows of `inverse` are the gradients of corners 1 and 2 in the cell's own frame; the cell turned by `angle` is the
-    # cloth.
+    # Rows of `inverse` are the gradients of the barycentric weights of corners 1 and 2 in the cell's own frame [1/m]; the cell turned
+    # by `angle` is the cloth.
     c, s = np.cos(angle), np.sin(angle)
     gradients = np.stack([-(inverse[:, 0] + inverse[:, 1]), inverse[:, 0], inverse[:, 1]], axis=1)
-    return np.stack(
+    turned = np.stack(
         [
             c[:, None] * gradients[..., 0] - s[:, None] * gradients[..., 1],
             s[:, None] * gradients[..., 0] + c[:, None] * gradients[..., 1],
         ],
         axis=-1,
     )
+    along = np.stack([turned @ axes[0], turned @ axes[1]], axis=-1) * stretch[:, None, :]
+    c_warp, c_weft, c_cross = plane_stress(fabric)
+    shear = 2.0 * fabric.shear_stiffness
+    conductivity = np.array([max(c_warp + c_cross, shear), max(c_weft + c_cross, shear)])
+    flat = np.where(det > 0.0, area / (stretch[:, 0] * stretch[:, 1]), 0.0)
+    weights = np.stack(
+        [np.maximum(-flat * ((along[:, i] * along[:, j]) @ conductivity), 0.0) for i, j in ((0, 1), (1, 2), (2, 0))],
+        axis=1,
+    )
+    return weights, corner_sums(weights)
 
 
 def corner_sums(weights: FloatArray) -> FloatArray:

@@ -177,7 +177,13 @@ class SpringNetwork:
         springs.offset = _on(device, at.offset, wp.int32)
         springs.neighbor = _on(device, at.neighbor, wp.int32)
         springs.rest_length = _on(device, s.listed_length, wp.float64)
-        springs.active = _on(device, self._active(), wp.int8)
+        # At these vertices the springs are the cloth.
+        active: NDArray[np.int8] = np.broadcast_to(np.int8(self.model == "springs"), count)
+        if len({model for model, _ in self.parts}) > 1:
+            active, models = np.zeros(count, dtype=np.int8), [model == "springs" for model, _ in self.parts]
+            of_springs = c.faces[np.repeat(models, [number for _, number in self.parts])]
+            active[of_springs[of_springs >= 0]] = 1
+        springs.active = _on(device, active, wp.int8)
         self.springs = springs
         # Those of a membrane change with its layout.
         k_ij = s.listed_stiffness if self.model == "springs" else s.listed_stiffness.copy()
@@ -254,15 +260,6 @@ class SpringNetwork:
                 found.append(CellModel(model, first, count, *kernels, self.cloth))
             first += count
         return tuple(found)
-
-    def _active(self) -> NDArray[np.int8]:
-        """Return 1 at the vertices whose springs are the cloth, #V."""
-        if len({model for model, _ in self.parts}) < 2:
-            return np.broadcast_to(np.int8(self.model == "springs"), self.vertex_count)
-        active, models = np.zeros(self.vertex_count, dtype=np.int8), [model == "springs" for model, _ in self.parts]
-        corners = self.cell_arrays.faces[np.repeat(models, [count for _, count in self.parts])]
-        active[corners[corners >= 0]] = 1
-        return active
 
     @property
     def vertex_count(self) -> int:

@@ -69,21 +69,9 @@ class Coarsening:
 @once_per_surface
 def _next(surface: Surface) -> Coarsening | None:
     grid = rows_and_columns(surface)
-    return coarsen(surface) if grid is None else _every_second(surface, grid)
-
-
-def iterate_coarsenings(surface: Surface, smallest: int = _COARSEST) -> Iterator[Coarsening]:
-    """Iterate over the coarser meshes of a surface of more than `smallest` vertices, the finest first; each is made once."""
-    while len(surface.vertices) > smallest:
-        step = _next(surface)
-        if step is None:
-            return
-        yield step
-        surface = step.surface
-
-
-def _every_second(surface: Surface, grid: IntArray) -> Coarsening:
-    """Keep every second row and column of a grid (#rows by #columns vertices), and the last ones; between them layouts are bilinear."""
+    if grid is None:
+        return coarsen(surface)
+    # Every second row and column of a grid is kept, and the last ones; between them layouts are bilinear.
     place = np.empty(grid.size, dtype=np.int32)
     place[grid.ravel()] = np.arange(grid.size, dtype=np.int32)
     lines = [np.union1d(np.arange(0, count, 2), count - 1) for count in grid.shape]
@@ -111,6 +99,16 @@ def _every_second(surface: Surface, grid: IntArray) -> Coarsening:
         prolongation=csr_array(kron(*between, format="csr"))[place],
         face_of=face_at[np.ix_(*(line[:-1] for line in lines))].ravel(),
     )
+
+
+def iterate_coarsenings(surface: Surface, smallest: int = _COARSEST) -> Iterator[Coarsening]:
+    """Iterate over the coarser meshes of a surface of more than `smallest` vertices, the finest first; each is made once."""
+    while len(surface.vertices) > smallest:
+        step = _next(surface)
+        if step is None:
+            return
+        yield step
+        surface = step.surface
 
 
 def coarsen(surface: Surface) -> Coarsening | None:

@@ -260,15 +260,29 @@ def stiffness_matrix(network: SpringNetwork, positions: FloatArray, known: Float
     It leaves out what is negative, as across compressed springs and threads, so that each direction is one of descent. That of a
     membrane's cells may be `known` (see :func:`cell_stiffness`).
     """
-    cells, size = network.cell_arrays, 2 * network.vertex_count
+    cells, springs, count = network.cell_arrays, network.spring_arrays, network.vertex_count
+    size = 2 * count
     free, matrix = diags_array(network.bonds.freedom.numpy().ravel()), csc_array((size, size))
     for part in network.cell_models:
         begin, end = cells.of_face[[part.first, part.first + part.count]]
         if part.model == "springs":
-            rows = (
-                vstack([*_spring_rows(network, positions, part), *_guard_rows(network, positions, slice(begin, end))])
-                @ free
-            )
+            ends, rest, stiffness = springs.ends, springs.rest_length, springs.stiffness
+            if part.count < network.face_count:
+                inside = np.zeros(count, dtype=bool)
+                inside[cells.faces[part.first : part.first + part.count].ravel()] = True
+                own = inside[ends[:, 0]]
+                ends, rest, stiffness = ends[own], rest[own], stiffness[own]
+            d = positions[ends[:, 1]] - positions[ends[:, 0]]
+            length = np.sqrt(np.einsum("ij,ij->i", d, d))
+            # Rows are along each spring, and across those that are stretched.
+            along = d * (np.sqrt(stiffness) / length)[:, None]
+            stretched = np.flatnonzero(length > rest)
+            across = turned_left(along[stretched]) * np.sqrt(1.0 - rest[stretched] / length[stretched])[:, None]
+            of_springs = [
+                _rows(count, of, np.stack([-vector, vector], axis=1))
+                for of, vector in ((ends, along), (ends[stretched], across))
+            ]
+            rows = vstack([*of_springs, *_guard_rows(network, positions, slice(begin, end))]) @ free
             matrix = matrix + rows.T @ rows
         else:
             entries = (cell_stiffness(network, positions, part) if known is None else known)[begin:end]
@@ -323,26 +337,6 @@ def _rows(count: int, vertices: IntArray, gradient: FloatArray) -> csr_array:
     columns = 2 * vertices[:, :, None] + np.arange(2, dtype=np.int32)
     offset = np.arange(len(vertices) + 1, dtype=np.int32) * np.int32(2 * vertices.shape[1])
     return csr_array((gradient.ravel(), columns.ravel(), offset), shape=(len(vertices), 2 * count))
-
-
-def _spring_rows(network: SpringNetwork, positions: FloatArray, part: CellModel) -> list[csr_array]:
-    """Return the rows along each spring of a part, and across those that are stretched."""
-    springs, count = network.spring_arrays, network.vertex_count
-    ends, rest, stiffness = springs.ends, springs.rest_length, springs.stiffness
-    if part.count < network.face_count:
-        inside = np.zeros(count, dtype=bool)
-        inside[network.cell_arrays.faces[part.first : part.first + part.count].ravel()] = True
-        own = inside[ends[:, 0]]
-        ends, rest, stiffness = ends[own], rest[own], stiffness[own]
-    d = positions[ends[:, 1]] - positions[ends[:, 0]]
-    length = np.sqrt(np.einsum("ij,ij->i", d, d))
-    along = d * (np.sqrt(stiffness) / length)[:, None]
-    stretched = np.flatnonzero(length > rest)
-    across = turned_left(along[stretched]) * np.sqrt(1.0 - rest[stretched] / length[stretched])[:, None]
-    return [
-        _rows(count, of, np.stack([-vector, vector], axis=1))
-        for of, vector in ((ends, along), (ends[stretched], across))
-    ]
 
 
 def _guard_rows(network: SpringNetwork, positions: FloatArray, part: slice) -> list[csr_array]:

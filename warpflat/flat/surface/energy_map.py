@@ -49,24 +49,23 @@ def energy_report(
     density = np.asarray(face_energy, dtype=np.float64) / np.where(areas > 0.0, areas, np.inf)
     at_vertices = smooth_to_vertices(surface, density)
     peak = int(np.argmax(at_vertices))
+    lines = {}
+    for name, line in surface.lines.items():
+        # Linear between its vertices.
+        along, step = at_vertices[line], segment_lengths(surface.vertices[line])
+        length = float(step.sum())
+        integral = float((0.5 * (along[:-1] + along[1:]) * step).sum())
+        mean = integral / length if length > 0 else float(along.mean())
+        lines[name] = {"length_m": length, "mean_j_per_m2": mean, "peak_j_per_m2": float(along.max())}
     report: dict[str, Any] = {
         "peak": place_in_words(surface, peak),
         "peak_j_per_m2": float(at_vertices[peak]),
-        "lines": {name: _along(surface, at_vertices, line) for name, line in surface.lines.items()},
+        "lines": lines,
     }
     if regions:
         energy = density * areas
         report["bricks"] = {name: float(energy[faces].sum()) for name, faces in regions.items()}
     return report
-
-
-def _along(surface: Surface, density: FloatArray, line: IntArray) -> dict[str, float]:
-    """Return the length of a line [m], and the mean and the highest density (#V [J/m2]) on it, linear between its vertices."""
-    along, step = density[line], segment_lengths(surface.vertices[line])
-    length = float(step.sum())
-    integral = float((0.5 * (along[:-1] + along[1:]) * step).sum())
-    mean = integral / length if length > 0 else float(along.mean())
-    return {"length_m": length, "mean_j_per_m2": mean, "peak_j_per_m2": float(along.max())}
 
 
 def place_in_words(surface: Surface, vertex: int, *, lines: int = 2) -> str:

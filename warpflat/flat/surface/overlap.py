@@ -20,9 +20,14 @@ def overlap_width(ring: FloatArray) -> float:
     """
     import shapely
 
-    # The ring runs the other way around a cell that is covered twice.
-    cells = shapely.get_parts(shapely.polygonize([shapely.node(shapely.LinearRing(ring))]))
-    twice = [cell for cell in cells if _turns_around(ring, np.asarray(cell.representative_point().coords[0])) < 0]
+    twice = []
+    for cell in shapely.get_parts(shapely.polygonize([shapely.node(shapely.LinearRing(ring))])):
+        # The ring runs the other way around a cell that is covered twice: its winding number, counter-clockwise, is negative.
+        spoke = ring - np.asarray(cell.representative_point().coords[0])
+        ahead = np.roll(spoke, -1, axis=0)
+        cross = spoke[:, 0] * ahead[:, 1] - spoke[:, 1] * ahead[:, 0]
+        if round(float(np.arctan2(cross, np.einsum("ij,ij->i", spoke, ahead)).sum()) / (2 * np.pi)) < 0:
+            twice.append(cell)
     return max((2.0 * float(shapely.maximum_inscribed_circle(cell).length) for cell in twice), default=0.0)
 
 
@@ -63,11 +68,3 @@ def overlapping(width: float) -> str:
         f"overlaps by {width * 1e3:.1f} mm instead of gaping: there is no dart to sew; it needs more cloth there, "
         "not less"
     )
-
-
-def _turns_around(ring: FloatArray, point: FloatArray) -> int:
-    """Return the winding number of a closed line about a point, counter-clockwise."""
-    spoke = ring - point
-    ahead = np.roll(spoke, -1, axis=0)
-    cross = spoke[:, 0] * ahead[:, 1] - spoke[:, 1] * ahead[:, 0]
-    return round(float(np.arctan2(cross, np.einsum("ij,ij->i", spoke, ahead)).sum()) / (2 * np.pi))

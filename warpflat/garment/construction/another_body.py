@@ -190,9 +190,18 @@ class FitJob:
                 f"{path}: half of it lies more than {100 * np.median(far):.0f} cm off {body or 'any body inside it'}; give the body on "
                 "which it was made, in the same axes and place, its unit with --units, or leave --from out"
             )
+        # A texture in millimetres or centimetres has been measured. One that fits in another unit may be a normalised one by chance:
+        # it must lay the cloth nearly as it is worn.
+        try:
+            panels = sewn_panels(raw, scale, name=make_piece_name(name or path.stem))
+        except InputError:
+            panels = []
+        if panels and panels[0].unit not in ("mm", "cm"):
+            stretched = np.concatenate([np.abs(stretches_worn(panel.surface, panel.cut) - 1.0) for panel in panels])
+            panels = panels if float(np.percentile(stretched, 90)) <= _AS_WORN else []
         return cls(
             path=path, surfaces=surfaces, raw=raw, scale=scale, layers=layers, body=worn, turn=turn, shift=shift,
-            panels=_known_pattern(raw, scale, name or path.stem), notes=tuple(notes),
+            panels=panels, notes=tuple(notes),
         )  # fmt: skip
 
     def to(self, body: str, ease: Mapping[str, float], *, keep_pose: bool = False) -> Carried:
@@ -288,22 +297,6 @@ class FitJob:
         """Return where the vertices of each layer are on the carried garment, #V by 3 [m]."""
         tree = cKDTree(self.raw.vertices * self.scale)
         return [carried.vertices[tree.query(layer.vertices)[1]] for layer in self.surfaces]
-
-
-def _known_pattern(raw: RawMesh, scale: float, name: str) -> list[SewnPanel]:
-    """Return the panels of a garment whose texture is its sewn pattern; none where it is a picture's, or may be one.
-
-    A texture in millimetres or centimetres has been measured. One that fits in another unit may be a normalised one by chance: it must lay
-    the cloth nearly as it is worn.
-    """
-    try:
-        panels = sewn_panels(raw, scale, name=make_piece_name(name))
-    except InputError:
-        return []
-    if panels[0].unit in ("mm", "cm"):
-        return panels
-    stretched = np.concatenate([np.abs(stretches_worn(panel.surface, panel.cut) - 1.0) for panel in panels])
-    return panels if float(np.percentile(stretched, 90)) <= _AS_WORN else []
 
 
 @lru_cache(maxsize=4)

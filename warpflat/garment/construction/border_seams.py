@@ -65,10 +65,27 @@ def surface_seams(surface: Surface, named: Sequence[SeamTable]) -> list[Stitchin
                     f"{seam.lines[0]!r} is {1e3 * lengths[0]:.1f} mm long and {seam.lines[1]!r} {1e3 * lengths[1]:.1f} mm, and they are "
                     f"not one curve in space; sides agree within {_ALIKE:.0%}, or {_AS_MANY:.0%} with as many vertices each"
                 )
+            # Joined are all vertices, one to one, or those whose shares of the length are the nearest.
+            shares = [arc / length for arc, length in zip(arcs, lengths, strict=True)]
+            joints: IntArray | None = None
+            if (
+                len(first) != len(second)
+                or not np.abs(shares[0] - shares[1]).max() <= _SAME_SHARE * np.diff(shares[0]).min()
+            ):
+                swapped = len(first) > len(second)
+                coarse, fine = shares[::-1] if swapped else shares
+                place = np.abs(fine[None, :] - coarse[:, None]).argmin(axis=1)
+                place[0], place[-1] = 0, len(fine) - 1
+                keep = np.append(np.diff(place) > 0, True)
+                keep[0] = True
+                pairs = np.column_stack([np.flatnonzero(keep), place[keep]])
+                # The first joint is kept for good: one that falls onto it again goes.
+                pairs = pairs[np.append(True, np.diff(pairs[:, 1]) > 0)]
+                joints = np.asarray(pairs[:, ::-1] if swapped else pairs, dtype=np.int32)
             found.append(
                 Stitching(
                     name=seam.name, pieces=(surface.name, surface.name), vertices=(first, second), ratio=1.0 / (1.0 + seam.ease),
-                    joints=_joints(arcs[0] / lengths[0], arcs[1] / lengths[1]),
+                    joints=joints,
                     sides=(f"{surface.name}.{seam.lines[0]}", f"{surface.name}.{seam.lines[1]}"),
                 )
             )  # fmt: skip
@@ -91,26 +108,6 @@ def _side(surface: Surface, along: set[tuple[int, int]], line: str) -> IntArray:
     raise InputError(
         f"line {line!r} leaves the border between vertices {a} and {b}; a side is one stretch of border that no cut parts"
     )
-
-
-def _joints(first: FloatArray, second: FloatArray) -> IntArray | None:
-    """Match two rows of vertices by their shares of the length (#P each).
-
-    Returns:
-        #J by 2, positions in both rows that are sewn to each other; None if all are, one to one.
-    """
-    if len(first) == len(second) and np.abs(first - second).max() <= _SAME_SHARE * np.diff(first).min():
-        return None
-    swapped = len(first) > len(second)
-    coarse, fine = (second, first) if swapped else (first, second)
-    place = np.abs(fine[None, :] - coarse[:, None]).argmin(axis=1)
-    place[0], place[-1] = 0, len(fine) - 1
-    keep = np.append(np.diff(place) > 0, True)
-    keep[0] = True
-    pairs = np.column_stack([np.flatnonzero(keep), place[keep]])
-    # The first joint is kept for good: one that falls onto it again goes.
-    pairs = pairs[np.append(True, np.diff(pairs[:, 1]) > 0)]
-    return np.asarray(pairs[:, ::-1] if swapped else pairs, dtype=np.int32)
 
 
 def _largest_distance(points: FloatArray, line: FloatArray) -> float:

@@ -125,11 +125,8 @@ def carry(surface: Surface, before: FloatArray, after: FloatArray, triangles: ND
     # Smoothness bends what grows evenly at borders, so the even part of the move is taken out before.
     given = np.column_stack([surface.vertices, np.ones(len(moved))])
     even = given @ np.linalg.lstsq(trust[:, None] ** 0.5 * given, trust[:, None] ** 0.5 * moved, rcond=None)[0]
-    return _flat_borders(surface, even + factor_symmetric(system.tocsc())(trust[:, None] * (moved - even)))
-
-
-def _flat_borders(surface: Surface, carried: FloatArray) -> FloatArray:
-    """Return the carried garment with those borders in a plane that were in one; what lies between borders follows."""
+    carried = even + factor_symmetric(system.tocsc())(trust[:, None] * (moved - even))
+    # Borders that lay in a plane lie in one again; what lies between borders follows.
     loops = border_loops(surface.faces, surface.vertices)
     moves = [np.zeros((len(loop), 3)) for loop in loops]
     for loop, move in zip(loops, moves, strict=True):

@@ -197,7 +197,19 @@ def equations_of_constraint(
         InputError: the piece has no such line, or the line cannot be constrained in this way.
     """
     if isinstance(constraint, DartMouth):
-        return _mouth_equations(constraint, piece), False
+        lines = piece.network.surface.lines
+        mouths = []
+        for dart in (constraint.dart, *([] if constraint.like is None else [constraint.like])):
+            if f"{dart}.left" not in lines:
+                known = [line.removesuffix(".left") for line in lines if line.endswith(".left")]
+                raise InputError(f"piece {constraint.piece!r} has no dart {dart!r}; {nearest(dart, known)}")
+            left, right = lines[f"{dart}.left"], lines[f"{dart}.right"]
+            # A fish-eye dart's legs both run from its first tip to its second.
+            ends = (0, -1) if left[0] != right[0] else (len(left) // 2, len(left) // 2)
+            mouths.append(np.array([left[ends[0]], right[ends[1]]], dtype=np.int32))
+        if constraint.width is not None:
+            return length_equations(mouths[0], np.array([constraint.width])), False
+        return seam_equations(mouths[0], mouths[1]), False
     if isinstance(constraint, DrawnLine):
         return shape_equations(constraint.vertices, constraint.shape), False
     surface = piece.network.surface
@@ -240,23 +252,6 @@ def equations_of_constraint(
     axis = vertices[partner == vertices]
     pairs = np.column_stack([vertices, partner])[is_first]
     return mirror_equations(pairs, axis, across, float((piece.positions[axis] @ across).mean())), True
-
-
-def _mouth_equations(constraint: DartMouth, piece: Flattening) -> ConstraintEquations:
-    """Return the equation of a dart's mouth."""
-    lines = piece.network.surface.lines
-    mouths = []
-    for dart in (constraint.dart, *([] if constraint.like is None else [constraint.like])):
-        if f"{dart}.left" not in lines:
-            known = [line.removesuffix(".left") for line in lines if line.endswith(".left")]
-            raise InputError(f"piece {constraint.piece!r} has no dart {dart!r}; {nearest(dart, known)}")
-        left, right = lines[f"{dart}.left"], lines[f"{dart}.right"]
-        # A fish-eye dart's legs both run from its first tip to its second.
-        ends = (0, -1) if left[0] != right[0] else (len(left) // 2, len(left) // 2)
-        mouths.append(np.array([left[ends[0]], right[ends[1]]], dtype=np.int32))
-    if constraint.width is not None:
-        return length_equations(mouths[0], np.array([constraint.width]))
-    return seam_equations(mouths[0], mouths[1])
 
 
 def find_piece(constraint: PieceConstraint, pieces: Mapping[str, Flattening]) -> Flattening:

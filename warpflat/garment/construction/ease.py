@@ -84,7 +84,22 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamTable]) -> SeamRatios:
             raise InputError(f"there is no seam {wish.name!r}; {nearest(wish.name, by_name)}")
         if name in ease:
             raise InputError(f"seam {name!r} is named twice; give its fullness or gather once")
-        longer = _longer_side(by_name[name], wish.longer)
+        # The second side is the longer one if nothing else is said.
+        longer = 1
+        if wish.longer is not None:
+            of_wish = by_name[name]
+            named = [{part for side in sides for part in (side.piece, str(side))} for sides in of_wish.sides]
+            found = [number for number in (0, 1) if wish.longer in named[number]]
+            if not found:
+                raise InputError(
+                    f"seam {of_wish.name!r}: {wish.longer!r} is not one of its sides; {nearest(wish.longer, named[0] | named[1])}"
+                )
+            if len(found) == 2:
+                stretches = {str(side) for side in of_wish.stretches}
+                raise InputError(
+                    f"seam {of_wish.name!r}: both sides are of {wish.longer!r}; name the edge: {', '.join(sorted(stretches))}"
+                )
+            longer = found[0]
         ease[name] = wish.ease_if(longer)
         for number, (seam, first_side) in enumerate(plan.of_form):
             if seam.name != name:
@@ -146,22 +161,6 @@ def _is_cap(form: FormResult, seam: Seam) -> bool:
     (cap,) = seam.sides[1]
     hole, _, side = cap.edge.partition(" ")
     return hole == "armhole" and f"underarm {side}" in form.pieces[cap.piece].edges
-
-
-def _longer_side(seam: Seam, longer: str | None) -> int:
-    """Return which side of a seam (0 or 1) is longer; the second if nothing else is said."""
-    if longer is None:
-        return 1
-    named = [{part for side in sides for part in (side.piece, str(side))} for sides in seam.sides]
-    found = [number for number in (0, 1) if longer in named[number]]
-    if not found:
-        raise InputError(
-            f"seam {seam.name!r}: {longer!r} is not one of its sides; {nearest(longer, named[0] | named[1])}"
-        )
-    if len(found) == 2:
-        edges = {str(side) for side in seam.stretches}
-        raise InputError(f"seam {seam.name!r}: both sides are of {longer!r}; name the edge: {', '.join(sorted(edges))}")
-    return found[0]
 
 
 def _shares(piece: FormPiece, row: IntArray) -> FloatArray:

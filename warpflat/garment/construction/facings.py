@@ -167,7 +167,23 @@ def _faced(
         around = piece.internal_lines.get("keyhole") if sewn_in else None
         strip = strip_along(piece, chain, width, around=around)
         if stand is not None and stand.grown_on:
-            return _folded_over(piece, stand.edge, strip, sewn_in=sewn_in)
+            # The facing is grown on: the mirror image beyond an edge, which becomes a fold line inside.
+            at = [edge.name for edge in strip].index(stand.edge)
+            line = strip[at].points[[0, -1]]
+            x, y = direction(line)
+            out = np.array([-y, x])
+            images = [
+                replace(
+                    edge, name=f"facing {edge.name}", kind=edge.kind if sewn_in or edge.kind != "seam" else "cut",
+                    points=reflected(edge.points[::-1], out, float(line[0] @ out)), allowance=edge.width, vertices=None,
+                )
+                for edge in [*strip[:at][::-1], *strip[at + 1 :][::-1]]
+            ]  # fmt: skip
+            # Corners are shared bit for bit.
+            images[0].points[0], images[-1].points[-1] = line[0], line[1]
+            for one, other in pairwise(images):
+                other.points[0] = one.points[-1]
+            return drawn_on(with_edges(piece, {stand.edge: images}), [("fold line", line)])
         return strip_piece(piece, strip, title, "facing")
 
     return redrawn(pattern, name, faced)
@@ -215,7 +231,15 @@ def strip_along(piece: Piece, chain: Sequence[str], width: float, *, around: Flo
             line = np.array([line[0], line[0] + (width + 1e-3) * direction(line)])
         if polyline_length(line) <= width:
             raise InputError(f"the edges beside {where} are shorter than the facing is wide")
-        ends.append(_start(line, width, edge))
+        length = width
+        if edge.name.endswith(STAND):
+            # Up to that distance from a button stand.
+            x, y = direction(edge.points)
+            away = np.maximum.accumulate(np.abs((line - edge.points[0]) @ [-y, x]))
+            if away[-1] <= width:
+                raise InputError(f"the edges beside {edge.name} are shorter than the facing is wide")
+            length = float(np.interp(width, away, arc_lengths(line)))
+        ends.append(part_between(line, 0.0, length))
     first, last = ends[0][::-1], ends[1]
     line = joined(*(edge.points for edge in edges))
     rounding = _ROUND if len(edges) > 1 else 0.0
@@ -244,17 +268,6 @@ def strip_along(piece: Piece, chain: Sequence[str], width: float, *, around: Flo
     ]
 
 
-def _start(points: FloatArray, length: float, beside: Edge) -> FloatArray:
-    """Return the first part of a line: of a given length [m], or up to that distance from a button stand."""
-    if beside.name.endswith(STAND):
-        x, y = direction(beside.points)
-        away = np.maximum.accumulate(np.abs((points - beside.points[0]) @ [-y, x]))
-        if away[-1] <= length:
-            raise InputError(f"the edges beside {beside.name} are shorter than the facing is wide")
-        length = float(np.interp(length, away, arc_lengths(points)))
-    return part_between(points, 0.0, length)
-
-
 def sewn_inside(edges: Sequence[Edge]) -> list[Edge]:
     """Return the edges of a strip with its inner edge as a seam."""
     return [replace(edge, kind="seam", allowance=None) if edge.name == INNER else edge for edge in edges]
@@ -280,23 +293,3 @@ def strip_piece(piece: Piece, edges: Sequence[Edge], title: str, role: str, **ot
         return new_piece(title, piece, edges, role, **{**same, **other})
     except InputError:
         raise InputError(f"no {role} can be drawn along {piece.name}.{edges[0].name}: make it narrower") from None
-
-
-def _folded_over(piece: Piece, fold: str, edges: Sequence[Edge], *, sewn_in: bool) -> Piece:
-    """Return a piece with its facing grown on: the mirror image beyond an edge, which becomes a fold line inside."""
-    at = [edge.name for edge in edges].index(fold)
-    line = edges[at].points[[0, -1]]
-    x, y = direction(line)
-    out = np.array([-y, x])
-    images = [
-        replace(
-            edge, name=f"facing {edge.name}", kind=edge.kind if sewn_in or edge.kind != "seam" else "cut",
-            points=reflected(edge.points[::-1], out, float(line[0] @ out)), allowance=edge.width, vertices=None,
-        )
-        for edge in [*edges[:at][::-1], *edges[at + 1 :][::-1]]
-    ]  # fmt: skip
-    # Corners are shared bit for bit.
-    images[0].points[0], images[-1].points[-1] = line[0], line[1]
-    for one, other in pairwise(images):
-        other.points[0] = one.points[-1]
-    return drawn_on(with_edges(piece, {fold: images}), [("fold line", line)])

@@ -96,42 +96,80 @@ def plan_form(form: FormResult, rules: EdgeRules | None = None) -> FormPlan:
         rules: exceptions.
 
     Raises:
-        InputError: the rules name an edge or a kind that does not exist.
+        InputError: the rules name an edge, a seam or a kind that does not exist.
     """
     rules = rules or EdgeRules()
     sewing = _SewnEdges(form)
-    edges = {name: _plan_edges(form, name, sewing, rules) for name in form.pieces}
+    edges: dict[str, tuple[EdgePlan, ...]] = {}
+    for name, piece in form.pieces.items():
+        planned: list[EdgePlan] = []
+        taken: set[str] = set(piece.edges)
+        # The lowest of its free edges at a level where garments are hemmed.
+        heights = {
+            edge: float(np.mean(piece.surface.vertices[ids][:, 1]))
+            for edge, ids in piece.edges.items()
+            if piece.whole(edge) == edge and edge.split(" ")[0] in HEMMED_LEVELS and not sewing.covers((name, edge))
+        }
+        lowest = min(heights, key=lambda edge: heights[edge], default=None)
+        for edge, ids in piece.edges.items():
+            whole = piece.whole(edge)
+            parts = sewing.parts((name, edge), len(ids))
+            # The edge's own name stays with what is sewn.
+            keeper = next((number for number, (_, _, sewn) in enumerate(parts) if sewn), 0)
+            for number, (first, last, sewn) in enumerate(parts):
+                part = edge if number == keeper else find_unused_name(edge, taken)
+                taken.add(part)
+                kind = "seam" if sewn else "fold" if edge == piece.fold else "hem" if whole == lowest else "seam"
+                kind = "dart" if edge in piece.leg_edges else rules.kind(name, part, kind, whole=whole)
+                planned.append(EdgePlan(name=part, source=edge, whole=whole, first=first, last=last, kind=kind))
+        edges[name] = tuple(planned)
     rules.check({name: [plan.name for plan in plans] for name, plans in edges.items()})
     half = any(piece.fold for piece in form.pieces.values())
     quantities = {name: 1 if piece.fold or not half else 2 for name, piece in form.pieces.items()}
-    seams, of_form = _plan_seams(form, sewing, edges, rules)
-    return FormPlan(edges=edges, seams=seams, of_form=of_form, quantities=quantities)
+    names = {(piece, plan.source, plan.first): plan.name for piece, plans in edges.items() for plan in plans}
 
+    def chain(stretches: Sequence[_Stretch], *, turned: bool = False) -> tuple[SeamSide, ...]:
+        return tuple(
+            SeamSide(piece=s.piece, edge=names[s.piece, s.edge, s.first], reversed=s.against != turned)
+            for s in stretches
+        )
 
-def _plan_edges(form: FormResult, name: str, sewing: _SewnEdges, rules: EdgeRules) -> tuple[EdgePlan, ...]:
-    """Split the edges of one piece where they begin or end to be sewn, and give each part its name and kind."""
-    piece = form.pieces[name]
-    plans: list[EdgePlan] = []
-    taken: set[str] = set(piece.edges)
-    # The lowest of its free edges at a level where garments are hemmed.
-    heights = {
-        edge: float(np.mean(piece.surface.vertices[ids][:, 1]))
-        for edge, ids in piece.edges.items()
-        if piece.whole(edge) == edge and edge.split(" ")[0] in HEMMED_LEVELS and not sewing.covers((name, edge))
-    }
-    lowest = min(heights, key=lambda edge: heights[edge], default=None)
-    for edge, ids in piece.edges.items():
-        whole = piece.whole(edge)
-        parts = sewing.parts((name, edge), len(ids))
-        # The edge's own name stays with what is sewn.
-        keeper = next((number for number, (_, _, sewn) in enumerate(parts) if sewn), 0)
-        for number, (first, last, sewn) in enumerate(parts):
-            part = edge if number == keeper else find_unused_name(edge, taken)
-            taken.add(part)
-            kind = "seam" if sewn else "fold" if edge == piece.fold else "hem" if whole == lowest else "seam"
-            kind = "dart" if edge in piece.leg_edges else rules.kind(name, part, kind, whole=whole)
-            plans.append(EdgePlan(name=part, source=edge, whole=whole, first=first, last=last, kind=kind))
-    return tuple(plans)
+    # The names of seams that are several of the form's: that of the whole edge, "armhole left".
+    parted: dict[Place, set[str]] = {}
+    for number, both in enumerate(sewing.sides):
+        for around_hub in [side[0].place for side in both if side[0].place in sewing.hubs][:1]:
+            parted.setdefault(around_hub, set()).add(form.seams[number].name)
+    of_hubs: dict[Place, str] = {}
+    for around_hub, joined in parted.items():
+        others = {seam.name for seam in form.seams} - joined
+        of_hubs[around_hub] = find_unused_name(around_hub[1], others | set(of_hubs.values()))
+    # The seams by the hub or the number of the form's seam; a hub's are one seam.
+    seams: dict[Place | int, Seam] = {}
+    keys: list[tuple[Place | int, int]] = []
+    for number, both in enumerate(sewing.sides):
+        name = form.seams[number].name
+        hub = next((side[0] for side in both if side[0].place in sewing.hubs), None)
+        keys.append((number, 0) if hub is None else (hub.place, 1 - hub.side))
+        if hub is None:
+            sides = chain(both[0]), chain(both[1])
+        else:
+            around = [chain(sewing.partners(s), turned=s.against) for s in sewing.by_edge[hub.place]]
+            sides = (sum(around, ()), (SeamSide(piece=hub.piece, edge=hub.edge),))
+            name = of_hubs[hub.place]
+        if keys[-1][0] not in seams:
+            seams[keys[-1][0]] = Seam(
+                name=name,
+                sides=sides,
+                ease=rules.ease.get(name, 0.0),
+                eased=rules.eased.get(name, (0.0, 1.0)),
+                notches=tuple(at for at in rules.eased[name] if 0.0 < at < 1.0) if name in rules.eased else None,
+            )
+    known = [seam.name for seam in seams.values()]
+    for name in rules.ease:
+        if name not in known:
+            raise InputError(f"ease: there is no seam {name!r}; {nearest(name, known)}")
+    of_form = tuple((seams[key], side) for key, side in keys)
+    return FormPlan(edges=edges, seams=tuple(seams.values()), of_form=of_form, quantities=quantities)
 
 
 def check_fold_grain(folds: Mapping[str, str], grain_angle: float) -> None:
@@ -181,7 +219,15 @@ class _SewnEdges:
         self.by_edge: dict[Place, list[_Stretch]] = {}
         for stretch in sorted((s for sides in self.sides for side in sides for s in side), key=lambda s: s.first):
             self.by_edge.setdefault(stretch.place, []).append(stretch)
-        self.hubs = {place for place in self.by_edge if self._is_hub(place)}
+        self.hubs = set[Place]()
+        for place, here in self.by_edge.items():
+            if len(here) < 2 or not self.covers(place) or any(len(self.sides[s.seam][s.side]) > 1 for s in here):
+                continue
+            partners = [partner for stretch in here for partner in self.partners(stretch)]
+            if all(
+                len(self.by_edge[p.place]) == 1 and self.covers(p.place, [p]) and p.place != place for p in partners
+            ):
+                self.hubs.add(place)
 
     def partners(self, stretch: _Stretch) -> tuple[_Stretch, ...]:
         """Return the other side of a stretch's seam, in the direction of the stretch's edge."""
@@ -203,13 +249,6 @@ class _SewnEdges:
         cuts = sorted({0, count - 1, *ends})
         return [(a, b, any(stretch.first <= a and b <= stretch.last for stretch in here)) for a, b in pairwise(cuts)]
 
-    def _is_hub(self, place: Place) -> bool:
-        here = self.by_edge[place]
-        if len(here) < 2 or not self.covers(place) or any(len(self.sides[s.seam][s.side]) > 1 for s in here):
-            return False
-        partners = [partner for stretch in here for partner in self.partners(stretch)]
-        return all(len(self.by_edge[p.place]) == 1 and self.covers(p.place, [p]) and p.place != place for p in partners)
-
 
 def _stretches(form: FormResult, number: int, side: int) -> tuple[_Stretch, ...]:
     """Return one side of a form's seam as stretches of edges; runs that follow each other along an edge are one."""
@@ -223,55 +262,3 @@ def _stretches(form: FormResult, number: int, side: int) -> tuple[_Stretch, ...]
             stretch = replace(stretch, first=min(first, before.first), last=max(last, before.last))
         found.append(stretch)
     return tuple(found)
-
-
-def _plan_seams(
-    form: FormResult, sewing: _SewnEdges, edges: Mapping[str, Sequence[EdgePlan]], rules: EdgeRules
-) -> tuple[tuple[Seam, ...], tuple[tuple[Seam, int], ...]]:
-    """Return the seams of the pattern, and for each of the form's seams see `FormPlan.of_form`; a hub's are one seam.
-
-    Raises:
-        InputError: the rules name a seam that does not exist.
-    """
-    names = {(piece, plan.source, plan.first): plan.name for piece, plans in edges.items() for plan in plans}
-
-    def chain(stretches: Sequence[_Stretch], *, turned: bool = False) -> tuple[SeamSide, ...]:
-        return tuple(
-            SeamSide(piece=s.piece, edge=names[s.piece, s.edge, s.first], reversed=s.against != turned)
-            for s in stretches
-        )
-
-    # The names of seams that are several of the form's: that of the whole edge, "armhole left".
-    parts: dict[Place, set[str]] = {}
-    for number, both in enumerate(sewing.sides):
-        for around_hub in [side[0].place for side in both if side[0].place in sewing.hubs][:1]:
-            parts.setdefault(around_hub, set()).add(form.seams[number].name)
-    of_hubs: dict[Place, str] = {}
-    for around_hub, joined in parts.items():
-        others = {seam.name for seam in form.seams} - joined
-        of_hubs[around_hub] = find_unused_name(around_hub[1], others | set(of_hubs.values()))
-    seams: dict[Place | int, Seam] = {}
-    of_form: list[tuple[Place | int, int]] = []
-    for number, both in enumerate(sewing.sides):
-        name = form.seams[number].name
-        hub = next((side[0] for side in both if side[0].place in sewing.hubs), None)
-        of_form.append((number, 0) if hub is None else (hub.place, 1 - hub.side))
-        if hub is None:
-            sides = chain(both[0]), chain(both[1])
-        else:
-            around = [chain(sewing.partners(s), turned=s.against) for s in sewing.by_edge[hub.place]]
-            sides = (sum(around, ()), (SeamSide(piece=hub.piece, edge=hub.edge),))
-            name = of_hubs[hub.place]
-        if of_form[-1][0] not in seams:
-            seams[of_form[-1][0]] = Seam(
-                name=name,
-                sides=sides,
-                ease=rules.ease.get(name, 0.0),
-                eased=rules.eased.get(name, (0.0, 1.0)),
-                notches=tuple(at for at in rules.eased[name] if 0.0 < at < 1.0) if name in rules.eased else None,
-            )
-    known = [seam.name for seam in seams.values()]
-    for name in rules.ease:
-        if name not in known:
-            raise InputError(f"ease: there is no seam {name!r}; {nearest(name, known)}")
-    return tuple(seams.values()), tuple((seams[key], side) for key, side in of_form)

@@ -20,8 +20,6 @@ from warpflat.flat import (
     GrainAlignment,
     Relaxation,
     RelaxOptions,
-    SpringArrays,
-    SpringNetwork,
     border_loops,
     falloff_weights,
     given_options,
@@ -71,7 +69,19 @@ def give_fullness(
     # Gathers slant the mesh's edges off the grain, and springs along them would be another cloth.
     is_membrane = piece.network.model == "membrane" or any(edge.gathered for edge in edges)
     # The network at rest where the layout is wider by its fullness.
-    springs = _wider_springs(piece.network, piece.positions, axes, full, weighed=not is_membrane)
+    springs, surface = piece.network.spring_arrays, piece.network.surface
+    before = (piece.positions[springs.ends[:, 1]] - piece.positions[springs.ends[:, 0]]) @ np.column_stack(axes)
+    here = 0.5 * (full[springs.ends[:, 0]] + full[springs.ends[:, 1]])
+    longer = springs.listed(springs.rest_length * stretch_factor(before, here))
+    if not is_membrane:
+        # By what factors a quad's first edges and its others become longer: only springs of a membrane keep their stiffness.
+        of_quad, q = full[surface.faces].mean(axis=1), piece.positions[surface.faces] @ np.column_stack(axes)
+        sides = q[:, 1] - q[:, 0] + q[:, 2] - q[:, 3], q[:, 2] - q[:, 1] + q[:, 3] - q[:, 0]
+        wider = np.column_stack([stretch_factor(side, of_quad) for side in sides])
+        springs = springs_of(
+            surface, piece.network.fabric, piece.positions, grain_angle=piece.network.grain_angle, wider=wider
+        )
+    springs = replace(springs, listed_length=longer)
     # Cells whose shape on the body, E, becomes E D^-1 S D: at rest where the layout D has been widened by S.
     cells = piece.network.cell_arrays
     here = full[cells.corner].mean(axis=1)
@@ -146,25 +156,3 @@ def _runs_along(positions: FloatArray, line: IntArray, axes: tuple[FloatArray, F
     """Return 0 where the line's chord is nearer to the warp, 1 where it is nearer to the weft."""
     chord = positions[line[-1]] - positions[line[0]]
     return int(abs(float(chord @ axes[1])) > abs(float(chord @ axes[0])))
-
-
-def _wider_springs(
-    network: SpringNetwork,
-    positions: FloatArray,
-    axes: tuple[FloatArray, FloatArray],
-    full: FloatArray,
-    *,
-    weighed: bool,
-) -> SpringArrays:
-    """Return longer springs; `weighed` with the stiffness that quads of the new sides have, else with the one that they had."""
-    springs, surface = network.spring_arrays, network.surface
-    before = (positions[springs.ends[:, 1]] - positions[springs.ends[:, 0]]) @ np.column_stack(axes)
-    here = 0.5 * (full[springs.ends[:, 0]] + full[springs.ends[:, 1]])
-    longer = springs.listed(springs.rest_length * stretch_factor(before, here))
-    if weighed:
-        # By what factors a quad's first edges and its others become longer.
-        of_quad, q = full[surface.faces].mean(axis=1), positions[surface.faces] @ np.column_stack(axes)
-        sides = q[:, 1] - q[:, 0] + q[:, 2] - q[:, 3], q[:, 2] - q[:, 1] + q[:, 3] - q[:, 0]
-        wider = np.column_stack([stretch_factor(side, of_quad) for side in sides])
-        springs = springs_of(surface, network.fabric, positions, grain_angle=network.grain_angle, wider=wider)
-    return replace(springs, listed_length=longer)

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpflat.core import FloatArray
-from warpflat.flat import CellArrays, Surface, face_creases, laplacian_of, make_cells, read_only, store_results
+from warpflat.flat import Surface, face_creases, laplacian_of, make_cells, read_only, store_results
 
 __all__ = ["graded_layout", "stretches_worn"]
 
@@ -38,7 +38,29 @@ def graded_layout(surface: Surface, carried: FloatArray, cut: FloatArray) -> Flo
     cells = make_cells(surface)
     corner = cells.corner
     flat = _edges(cut, corner)
-    shapes = _growth(cells, flat, _edges(surface.vertices, corner), _edges(carried, corner)) @ flat
+    # By how much each cell is stretched from the one body to the other, in the pattern's axes, #C by 2 by 2, symmetric. The stretch is that
+    # of the map between both places, turned back by the rotation with which the cloth lies on the one body.
+    det = np.linalg.det(flat)
+    known = np.abs(det) > _SLIVER * np.einsum("cae,cae->c", flat, flat)
+    back = np.linalg.inv(np.where(known[:, None, None], flat, np.eye(2)))
+    metric = [
+        np.einsum("cae,caf->cef", each @ back, each @ back)
+        for each in (_edges(surface.vertices, corner), _edges(carried, corner))
+    ]
+    known &= np.linalg.eigvalsh(metric[0])[:, 0] > _COLLAPSED**2
+    metric = [np.where(known[:, None, None], each, np.eye(2)) for each in metric]
+    loose = np.linalg.inv(_root(metric[0]))
+    growth = _root(loose @ metric[1] @ loose)
+    # It is averaged over the cells around each vertex, as single cells of draped cloth are creased.
+    weight = np.repeat(np.abs(det) * cells.weight * known, 3)
+    at, count = cells.corner.ravel(), len(cells.around.offset) - 1
+    share = np.bincount(at, weight, minlength=count)
+    entries = np.repeat(growth.reshape(-1, 4), 3, axis=0) * weight[:, None]
+    total = np.stack([np.bincount(at, column, minlength=count) for column in entries.T], axis=1)
+    # A vertex among creased cells only grows as the panel does.
+    mean = total.sum(axis=0) / max(float(share.sum()), 1e-300)
+    smooth = np.where(share[:, None] > 0.0, total / np.maximum(share, 1e-300)[:, None], mean)
+    shapes = smooth[cells.corner].mean(axis=1).reshape(-1, 2, 2) @ flat
     one, other = shapes[:, :, 0], shapes[:, :, 1]
     length = np.maximum(np.linalg.norm(one, axis=1), 1e-12)
     along = np.einsum("ca,ca->c", one, other) / length
@@ -75,31 +97,6 @@ def stretches_worn(surface: Surface, cut: FloatArray) -> FloatArray:
 def _edges(points: FloatArray, corner: np.ndarray) -> FloatArray:
     """Return the edges of cells from corner 0 to corners 1 and 2, as columns, #C by 2 or 3 by 2 [m]."""
     return np.stack([points[corner[:, 1]] - points[corner[:, 0]], points[corner[:, 2]] - points[corner[:, 0]]], axis=2)
-
-
-def _growth(cells: CellArrays, flat: FloatArray, worn: FloatArray, carried: FloatArray) -> FloatArray:
-    """Return by how much each cell is stretched from the one body to the other, in the pattern's axes, #C by 2 by 2, symmetric.
-
-    The stretch is that of the map between both places, turned back by the rotation with which the cloth lies on the one body. It is
-    averaged over the cells around each vertex, as single cells of draped cloth are creased.
-    """
-    det = np.linalg.det(flat)
-    known = np.abs(det) > _SLIVER * np.einsum("cae,cae->c", flat, flat)
-    back = np.linalg.inv(np.where(known[:, None, None], flat, np.eye(2)))
-    metric = [np.einsum("cae,caf->cef", each @ back, each @ back) for each in (worn, carried)]
-    known &= np.linalg.eigvalsh(metric[0])[:, 0] > _COLLAPSED**2
-    metric = [np.where(known[:, None, None], each, np.eye(2)) for each in metric]
-    loose = np.linalg.inv(_root(metric[0]))
-    growth = _root(loose @ metric[1] @ loose)
-    weight = np.repeat(np.abs(det) * cells.weight * known, 3)
-    at, count = cells.corner.ravel(), len(cells.around.offset) - 1
-    share = np.bincount(at, weight, minlength=count)
-    entries = np.repeat(growth.reshape(-1, 4), 3, axis=0) * weight[:, None]
-    total = np.stack([np.bincount(at, column, minlength=count) for column in entries.T], axis=1)
-    # A vertex among creased cells only grows as the panel does.
-    mean = total.sum(axis=0) / max(float(share.sum()), 1e-300)
-    smooth = np.where(share[:, None] > 0.0, total / np.maximum(share, 1e-300)[:, None], mean)
-    return smooth[cells.corner].mean(axis=1).reshape(-1, 2, 2)
 
 
 def _root(matrix: FloatArray) -> FloatArray:

@@ -66,7 +66,15 @@ def add_lining(pattern: Pattern, cloth: str) -> Pattern:
     shell = [piece.name for piece in pattern.pieces[pattern.sample] if piece.role == "shell"]
     names = {name: free_piece_name(pattern, f"{name}_lining") for name in shell}
     # By piece its facings, each with the edge that takes the place of what it covers.
-    faced = {name: _facings_of(pattern, name) for name in shell}
+    faced = dict[str, dict[str, str]]()
+    for name in shell:
+        if _has_grown_facing(pattern.piece(name, pattern.sample)):
+            raise InputError(f'{name}: a facing that is grown on cannot be lined; give the buttons facing = "separate"')
+        faced[name] = {}
+        for seam in pattern.seams:
+            sewn_on = pattern.piece(seam.sides[1][0].piece, pattern.sample)
+            if seam.sides[0][0].piece == name and sewn_on.role == "facing":
+                faced[name][sewn_on.name] = f"{sewn_on.edges[0].name} {INNER}"
 
     def lining(piece: Piece) -> Piece:
         name = names[piece.name]
@@ -97,19 +105,3 @@ def add_lining(pattern: Pattern, cloth: str) -> Pattern:
             notch = centre_notch(pattern.piece(name, pattern.sample))
             whole = sewn(whole, f"lining to {facing}", *sides, notches=notch)
     return whole
-
-
-def _facings_of(pattern: Pattern, name: str) -> dict[str, str]:
-    """Return by facing of a piece the name of the edge that takes the place of what it covers.
-
-    Raises:
-        InputError: one is grown on.
-    """
-    if _has_grown_facing(pattern.piece(name, pattern.sample)):
-        raise InputError(f'{name}: a facing that is grown on cannot be lined; give the buttons facing = "separate"')
-    found = dict[str, str]()
-    for seam in pattern.seams:
-        facing = pattern.piece(seam.sides[1][0].piece, pattern.sample)
-        if seam.sides[0][0].piece == name and facing.role == "facing":
-            found[facing.name] = f"{facing.edges[0].name} {INNER}"
-    return found

@@ -103,7 +103,17 @@ def _with_opening(
     if opening.kind == "wrap":
         if seam.openings:
             raise InputError(f"{seam.name!r} has another opening; a wrap is open all along it")
-        return _with_wrap(pattern, seam, opening)
+        # Its halves run beyond the centre line, each over the other; they are not sewn there, but tied.
+        edges = {side.piece: side.edge for side in seam.stretches}
+        pattern = replace(pattern, seams=[each for each in pattern.seams if each.name != seam.name])
+        wrapped = [with_wrap(piece, edge, opening) for name, edge in edges.items() for piece in in_sizes(pattern, name)]
+        pattern = with_pieces(pattern, wrapped)
+        if not opening.tie or any(piece.name == "tie" for piece in pattern.pieces[pattern.sample]):
+            return pattern
+        return added(
+            pattern,
+            lambda like: folded_strip("tie", like, opening.tie, TIE_WIDTH, role="tie", quantity=2, grain=(0.2, 0.5)),
+        )
     end = _reach(opening, part)[1]
     if opening.kind != "godet":
         opened = SeamOpening(
@@ -115,7 +125,25 @@ def _with_opening(
     if opening.kind == "zip":
         return _with_zip(pattern, seam, opening, parts)
     if opening.kind == "buttons":
-        return _with_buttons(pattern, seam, opening, parts, depths)
+        # A button stand on both sides of the seam, which is sewn only below it, if the stand ends within the seam.
+        if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0:
+            raise InputError("buttons begin at the upper end of a seam between two edges")
+
+        def buttoned(piece: Piece, edge: str) -> Piece:
+            own = _part_of(parts[piece.size], seam)
+            below = depths[piece.size] - own.before
+            here = below[(below >= 0.0) & (below < own.whole)]
+            stop = _reach(opening, own)[1]
+            # All along an edge that is rounded it ends with that.
+            return with_button_stand(piece, edge, opening, stop if stop < own.whole else np.inf, here)
+
+        places = dict.fromkeys(side.place for side in seam.stretches)
+        pattern = replace(
+            pattern, seams=[each for each in pattern.seams if each.name != seam.name or not seam.openings[-1].whole]
+        )
+        return with_pieces(
+            pattern, [buttoned(piece, edge) for name, edge in places for piece in in_sizes(pattern, name)]
+        )
     if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0:
         raise InputError(f"a {opening.kind} begins at the lower end of a seam between two edges")
     for side in [side for side in seam.stretches if not side.mirrored]:
@@ -222,28 +250,6 @@ def _button_depths(pattern: Pattern, opening: OpeningTable, parts: _Parts) -> di
     return depths
 
 
-def _with_buttons(
-    pattern: Pattern, seam: Seam, opening: OpeningTable, parts: _Parts, depths: Mapping[str, FloatArray]
-) -> Pattern:
-    """Return a pattern with a button stand on both sides of a seam, which is sewn only below it, if the stand ends within the seam."""
-    if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0:
-        raise InputError("buttons begin at the upper end of a seam between two edges")
-
-    def buttoned(piece: Piece, edge: str) -> Piece:
-        part = _part_of(parts[piece.size], seam)
-        below = depths[piece.size] - part.before
-        here = below[(below >= 0.0) & (below < part.whole)]
-        end = _reach(opening, part)[1]
-        # All along an edge that is rounded it ends with that.
-        return with_button_stand(piece, edge, opening, end if end < part.whole else np.inf, here)
-
-    places = dict.fromkeys(side.place for side in seam.stretches)
-    pattern = replace(
-        pattern, seams=[each for each in pattern.seams if each.name != seam.name or not seam.openings[-1].whole]
-    )
-    return with_pieces(pattern, [buttoned(piece, edge) for name, edge in places for piece in in_sizes(pattern, name)])
-
-
 def _with_godet(pattern: Pattern, seam: Seam, opening: OpeningTable) -> Pattern:
     """Return a pattern with a wedge, a sector of a circle, in the lower end of a seam, whose edges have that end as edges of their own.
 
@@ -281,20 +287,6 @@ def _with_godet(pattern: Pattern, seam: Seam, opening: OpeningTable) -> Pattern:
         other = SeamSide(piece=name, edge=edge, reversed=edge == "right")
         pattern = sewn(pattern, f"{seam.name} godet", replace(side, edge=free, reversed=not down), other)
     return pattern
-
-
-def _with_wrap(pattern: Pattern, seam: Seam, opening: OpeningTable) -> Pattern:
-    """Return a pattern whose halves run beyond a centre line, each over the other; they are not sewn there, but tied."""
-    edges = {side.piece: side.edge for side in seam.stretches}
-    pattern = replace(pattern, seams=[each for each in pattern.seams if each.name != seam.name])
-    wrapped = [with_wrap(piece, edge, opening) for name, edge in edges.items() for piece in in_sizes(pattern, name)]
-    pattern = with_pieces(pattern, wrapped)
-    if not opening.tie or any(piece.name == "tie" for piece in pattern.pieces[pattern.sample]):
-        return pattern
-    return added(
-        pattern,
-        lambda like: folded_strip("tie", like, opening.tie, TIE_WIDTH, role="tie", quantity=2, grain=(0.2, 0.5)),
-    )
 
 
 def _keyhole(piece: Piece, opening: OpeningTable) -> Piece:

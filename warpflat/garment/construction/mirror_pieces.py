@@ -76,35 +76,29 @@ def draw_pairs_once(
 
     pieces = {size: [drawn(piece) for piece in row if piece.name not in copies] for size, row in pattern.pieces.items()}
     notes = tuple(f"{copy.of}: cut twice, once mirrored, it serves for {name} too" for name, copy in copies.items())
-    return replace(pattern, pieces=pieces, seams=_sewn_once(pattern.seams, copies)), notes
-
-
-def _sewn_once(seams: Sequence[Seam], copies: Mapping[str, Copy]) -> tuple[Seam, ...]:
-    """Replace the edges of pieces that are not drawn by those of the pieces that are.
-
-    Such a seam runs as its mirror image does, so that the notches of one are those of the other.
-    """
+    # Edges of pieces that are drawn take the place of others. Such a seam runs as its mirror image does, so that the notches of one are
+    # those of the other.
     sewn = []
-    for seam in seams:
+    for seam in pattern.seams:
         sides = drawn_sides(seam, copies)
         mirrored = [side for row in sides for side in row if side.mirrored]
         if not mirrored:
             sewn.append(seam)
             continue
-        image = _mirror_seam(mirrored[0], seams, copies)
-        assert image is not None  # draw_pairs_once sees to it
+        image = _mirror_seam(mirrored[0], pattern.seams, copies)
+        assert image is not None  # pieces whose seams have none are drawn
         other, place = image
-        ease, (first, last) = seam.ease, seam.eased
+        ease, (begin, end) = seam.ease, seam.eased
         if next(number for number in (0, 1) if mirrored[0] in sides[number]) != place:
-            first, last = (seam.reach(share, 1.0) / (1.0 + ease) for share in (first, last))
+            begin, end = (seam.reach(share, 1.0) / (1.0 + ease) for share in (begin, end))
             sides, ease = (sides[1], sides[0]), 1.0 / (1.0 + ease) - 1.0
         there = next(side for side in other.sides[place] if side.place == mirrored[0].place)
         if there.reversed != mirrored[0].reversed:
             sides = (run_back(sides[0]), run_back(sides[1]))
-            first, last = 1.0 - last, 1.0 - first
-        notches = None if seam.notches is None else tuple(at for at in (first, last) if 0.0 < at < 1.0)
-        sewn.append(replace(seam, sides=sides, ease=ease, eased=(first, last), notches=notches))
-    return tuple(sewn)
+            begin, end = 1.0 - end, 1.0 - begin
+        notches = None if seam.notches is None else tuple(at for at in (begin, end) if 0.0 < at < 1.0)
+        sewn.append(replace(seam, sides=sides, ease=ease, eased=(begin, end), notches=notches))
+    return replace(pattern, pieces=pieces, seams=tuple(sewn)), notes
 
 
 def _matching_edges(garment: Garment, pieces: Sequence[Piece], first: str, second: str) -> dict[str, str] | None:

@@ -76,6 +76,8 @@ def add_pockets(pattern: Pattern, pockets: Sequence[PocketTable]) -> Pattern:
 
 def _with_placed(pattern: Pattern, pocket: PocketTable) -> Pattern:
     """Return a pattern with a patch or welt pocket and its place, on both sides of a piece that has both."""
+    import shapely
+
     patch, welt, bag = (
         free_piece_name(pattern, f"{pocket.piece}_{what}") for what in ("pocket", "pocket_welt", "pocket_bag")
     )
@@ -85,7 +87,33 @@ def _with_placed(pattern: Pattern, pocket: PocketTable) -> Pattern:
         most = (pocket.most_share or math.inf) * polyline_length(_line_of(piece, pocket.line))
         smaller, keys = min(1.0, most / pocket.width), ("width_mm", "height_mm", "below_mm", "from_centre_mm")
         here = pocket.model_copy(update={key: smaller * getattr(pocket, key) for key in keys})
-        places = _places(piece, here)
+        up, across = up_and_across(piece)
+        level, high = _line_of(piece, here.line), here.height if here.kind == "patch" else here.welt
+        order = np.argsort(level @ across)
+        places = []
+        # It lies beside the centre line, or in the middle of a leg. Where a piece buttons, its centre line lies inside, and the edge of
+        # that name is its stand's.
+        known = {**piece.internal_lines, **lines_of(piece)}
+        centre = next((points for name, points in known.items() if name.startswith("centre")), None)
+        if centre is not None:
+            at, away = float((centre @ across).mean()), here.from_centre + 0.5 * here.width
+            middles = [at + away, at - away]
+        else:
+            if not any(name.startswith("crotch") for name in known):
+                raise InputError(f"piece {piece.name!r} has no centre line to place a pocket from")
+            height = float((level @ up).mean()) - here.below - 0.5 * high
+            row = shapely.LineString([height * up - 5.0 * across, height * up + 5.0 * across])
+            spots = shapely.get_coordinates(row.intersection(shapely.Polygon(piece.outline))) @ across
+            middles = [float(spots.min() + spots.max()) / 2] if len(spots) else []
+        for middle in middles:
+            top = float(np.interp(middle, (level @ across)[order], (level @ up)[order])) - here.below
+            place = (np.array([middle, top]) + _shape(here)) @ [across, up]
+            if shapely.Polygon(piece.outline).contains(shapely.Polygon(place)):
+                places.append(place)
+        if not places:
+            raise InputError(
+                f"a pocket {1e3 * here.width:.0f} by {1e3 * high:.0f} mm does not lie on {piece.name!r} there"
+            )
         count = len(places) * piece.quantity * (2 if piece.on_fold else 1)
         # Side by side, so that its corners stay sharp; the upper edge of a patch is left open.
         rows = [[*place[1:], place[0]] if pocket.kind == "patch" else [*place, place[0]] for place in places]
@@ -124,55 +152,6 @@ def _shape(pocket: PocketTable) -> FloatArray:
     half, high = 0.5 * pocket.width, pocket.height if pocket.kind == "patch" else pocket.welt
     corners = np.array([(half, 0.0), (-half, 0.0), (-half, -high), (0.0, -high - _POINT), (half, -high)])
     return corners if pocket.kind == "patch" else corners[[0, 1, 2, 4]]
-
-
-def _places(piece: Piece, pocket: PocketTable) -> list[FloatArray]:
-    """Return the corners of a patch or welt pocket wherever it lies on a piece.
-
-    Raises:
-        InputError: it does not lie on it.
-    """
-    import shapely
-
-    up, across = up_and_across(piece)
-    level, high = _line_of(piece, pocket.line), pocket.height if pocket.kind == "patch" else pocket.welt
-    order = np.argsort(level @ across)
-    found = []
-    for middle in _middles(piece, pocket, across, float((level @ up).mean()) - pocket.below - 0.5 * high):
-        top = float(np.interp(middle, (level @ across)[order], (level @ up)[order])) - pocket.below
-        place = (np.array([middle, top]) + _shape(pocket)) @ [across, up]
-        if shapely.Polygon(piece.outline).contains(shapely.Polygon(place)):
-            found.append(place)
-    if not found:
-        raise InputError(
-            f"a pocket {1e3 * pocket.width:.0f} by {1e3 * high:.0f} mm does not lie on {piece.name!r} there"
-        )
-    return found
-
-
-def _middles(piece: Piece, pocket: PocketTable, across: FloatArray, level: float) -> list[float]:
-    """Return where across a piece the middles of its pockets lie [m]: beside its centre line, or in the middle of a leg.
-
-    Args:
-        piece: with the pocket.
-        pocket: how far it lies from the centre line.
-        across: direction of the weft.
-        level: along the warp, at which the middle of a leg is taken [m].
-    """
-    import shapely
-
-    # Where a piece buttons, its centre line lies inside, and the edge of that name is its stand's.
-    known = {**piece.internal_lines, **lines_of(piece)}
-    centre = next((points for name, points in known.items() if name.startswith("centre")), None)
-    if centre is not None:
-        at, away = float((centre @ across).mean()), pocket.from_centre + 0.5 * pocket.width
-        return [at + away, at - away]
-    if not any(name.startswith("crotch") for name in known):
-        raise InputError(f"piece {piece.name!r} has no centre line to place a pocket from")
-    up = np.array([-across[1], across[0]])
-    row = shapely.LineString([level * up - 5.0 * across, level * up + 5.0 * across])
-    spots = shapely.get_coordinates(row.intersection(shapely.Polygon(piece.outline))) @ across
-    return [float(spots.min() + spots.max()) / 2] if len(spots) else []
 
 
 def _with_hip_pocket(pattern: Pattern, pocket: PocketTable) -> Pattern:

@@ -23,7 +23,7 @@ from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LINES, RING_LEVELS
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.forms import FormResult
-    from warpflat.garment.mannequin.mannequin import Level, Mannequin
+    from warpflat.garment.mannequin.mannequin import Mannequin
 
 __all__ = ["GarmentRing", "find_rings", "measure_rings"]
 
@@ -121,7 +121,32 @@ def measure_rings(
     )
     found = []
     for name, length in lengths.items():
-        over, girth, source = _passes_over(mannequin, levels, _line_of(name), over_head=over_head)
+        # Over it is the widest part of the body that must pass through.
+        line = _line_of(name)
+        limb, _, side = line.partition(" ")
+        if line == "neck":
+            # A suit with legs is stepped into through its neck.
+            ends, between = ("head", []) if over_head else ("", list(RING_LEVELS[: RING_LEVELS.index("waist")]))
+        elif limb in ARM_LEVELS:
+            ends, between = f"hand {side}", [f"{level} {side}" for level in ARM_LEVELS[ARM_LEVELS.index(limb) + 1 :]]
+        elif side and limb in LEG_LINES.values():
+            lines = list(LEG_LINES.values())
+            ends, between = f"foot {side}", [f"{below} {side}" for below in lines[lines.index(limb) + 1 :]]
+        elif over_head:
+            ends, between = "head", list(RING_LEVELS[RING_LEVELS.index(line) + 1 :])
+        else:
+            ends, between = "", list(RING_LEVELS[: RING_LEVELS.index(line)])
+        passing = {level: levels[level].girth for level in between}
+        tape = mannequin.extremity(ends)
+        if tape is not None:
+            passing[ends] = tape
+        if passing and (between or tape is not None):
+            over = max(passing, key=lambda part: passing[part])
+            girth, source = passing[over], mannequin.source
+        elif ends:
+            over, girth, source = ends, None, "not measured"
+        else:
+            over, girth, source = "nothing", 0.0, "nothing lies below it"
         found.append(
             GarmentRing(
                 name=name, edge=name in edges, length=length, stretched=length * (1.0 + strain_limit), over=over,
@@ -176,30 +201,3 @@ def _line_of(name: str) -> str:
     """Return the line of a ring's name: a second ring at "hip" is "hip 2"."""
     head, _, tail = name.rpartition(" ")
     return head if tail.isdigit() else name
-
-
-def _passes_over(
-    mannequin: Mannequin, levels: Mapping[str, Level], name: str, *, over_head: bool
-) -> tuple[str, float | None, str]:
-    """Return the widest part of the body that must pass through a ring at a line, its girth [m] and the source."""
-    limb, _, side = name.partition(" ")
-    if name == "neck":
-        # A suit with legs is stepped into through its neck.
-        ends, between = ("head", []) if over_head else ("", list(RING_LEVELS[: RING_LEVELS.index("waist")]))
-    elif limb in ARM_LEVELS:
-        ends, between = f"hand {side}", [f"{level} {side}" for level in ARM_LEVELS[ARM_LEVELS.index(limb) + 1 :]]
-    elif side and limb in LEG_LINES.values():
-        lines = list(LEG_LINES.values())
-        ends, between = f"foot {side}", [f"{line} {side}" for line in lines[lines.index(limb) + 1 :]]
-    elif over_head:
-        ends, between = "head", list(RING_LEVELS[RING_LEVELS.index(name) + 1 :])
-    else:
-        ends, between = "", list(RING_LEVELS[: RING_LEVELS.index(name)])
-    girths = {level: levels[level].girth for level in between}
-    tape = mannequin.extremity(ends)
-    if tape is not None:
-        girths[ends] = tape
-    if not girths or (ends and tape is None and not between):
-        return ends or "nothing", None if ends else 0.0, "not measured" if ends else "nothing lies below it"
-    widest = max(girths, key=lambda part: girths[part])
-    return widest, girths[widest], mannequin.source

@@ -361,7 +361,34 @@ def _form_piece(
         allowance = rules.allowance(name, part.name, of_kind, whole=part.whole)
         points = flat.positions[vertices]
         edges.append(Edge(name=part.name, points=points, kind=kind, allowance=allowance, vertices=vertices))
-    edges = _clear_legs(edges, piece.darts, name)
+    # Where the legs of a dart overlap by less than `CLOSED` short of its tip, the tip moves back to where they meet.
+    by_name = {edge.name: edge for edge in edges}
+    for dart, names in piece.darts.items():
+        first, second = (by_name[each] for each in names)
+        count, overlap = open_length(first.points, second.points[::-1])
+        if count == 0:
+            raise InputError(
+                f"piece {name!r}: dart {dart!r} overlaps at its mouth: the cloth wants no dart there; leave it out, or give "
+                "it a width, mouth_mm = 10"
+            )
+        if overlap > CLOSED:
+            raise InputError(
+                f"piece {name!r}: the legs of dart {dart!r} overlap by {1e3 * overlap:.2g} mm: let it open wider, mouth_mm = 15, "
+                "or make it shorter"
+            )
+        if count == len(first.points):
+            continue
+        kept = slice(0, count)
+        tip = 0.5 * (first.points[count] + second.points[::-1][count])
+        for leg, turn in ((first, 1), (second, -1)):
+            points = np.vstack([leg.points[::turn][kept], tip])[::turn]
+            ids = (
+                None
+                if leg.vertices is None
+                else np.append(leg.vertices[::turn][kept], leg.vertices[::turn][-1])[::turn]
+            )
+            by_name[leg.name] = replace(leg, points=points, vertices=ids)
+    edges = list(by_name.values())
     legs = {edge.name: edge.points for edge in edges if edge.kind == "dart"}
     darts = [
         Dart(
@@ -415,41 +442,6 @@ def _placement(piece: Piece, flat: Flattening) -> FloatArray | None:
     outward = np.cross(turn[:, 0], turn[:, 1])
     away = float(((flat.surface.vertices - middle) @ outward).max()) + BESIDE
     return np.column_stack([turn, middle + away * outward - turn @ plane.mean(axis=0)])
-
-
-def _clear_legs(edges: Sequence[Edge], darts: Mapping[str, tuple[str, str]], piece: str) -> list[Edge]:
-    """Move the tip of a dart whose legs overlap by less than `CLOSED` short of it back to where they meet.
-
-    Raises:
-        InputError: the legs of a dart overlap from the border on, or by more.
-    """
-    by_name = {edge.name: edge for edge in edges}
-    for dart, names in darts.items():
-        left, right = (by_name[name] for name in names)
-        count, overlap = open_length(left.points, right.points[::-1])
-        if count == 0:
-            raise InputError(
-                f"piece {piece!r}: dart {dart!r} overlaps at its mouth: the cloth wants no dart there; leave it out, or give "
-                "it a width, mouth_mm = 10"
-            )
-        if overlap > CLOSED:
-            raise InputError(
-                f"piece {piece!r}: the legs of dart {dart!r} overlap by {1e3 * overlap:.2g} mm: let it open wider, mouth_mm = 15, "
-                "or make it shorter"
-            )
-        if count == len(left.points):
-            continue
-        kept = slice(0, count)
-        tip = 0.5 * (left.points[count] + right.points[::-1][count])
-        for leg, turn in ((left, 1), (right, -1)):
-            points = np.vstack([leg.points[::turn][kept], tip])[::turn]
-            ids = (
-                None
-                if leg.vertices is None
-                else np.append(leg.vertices[::turn][kept], leg.vertices[::turn][-1])[::turn]
-            )
-            by_name[leg.name] = replace(leg, points=points, vertices=ids)
-    return list(by_name.values())
 
 
 def _inner_lines(lines: Mapping[str, Any], border: Sequence[IntArray], flat: FloatArray) -> dict[str, FloatArray]:
@@ -568,6 +560,8 @@ def pattern_of_surface(
 
 def _mesh_piece(result: Flattening, ends: Collection[int] = (), *, is_worn: bool = False) -> Piece:
     """Return one piece with its cuts as darts, and its grain."""
+    import shapely
+
     darts: dict[str, tuple[int, int, int]] = {}
     fisheyes: dict[str, Crack] = {}
     tip_back = {title: cut.tip_back for title, cut, _ in seams_of_cuts(result)}
@@ -621,7 +615,13 @@ def _mesh_piece(result: Flattening, ends: Collection[int] = (), *, is_worn: bool
     ]
     on_border = np.isin(result.datum, np.concatenate(loops)).mean() > 0.5
     datum = None if on_border else result.positions[result.datum]
-    grain = _clear_of_holes(grain_of(piece.outline, result, datum), piece)
+    # The grain line moves aside as far as it takes to keep off holes and fish-eye darts.
+    line = grain_of(piece.outline, result, datum)
+    along = unit(line[1] - line[0])
+    across = np.array([along[1], -along[0]])
+    free = shapely.Polygon(piece.outline, [hole.points for hole in piece.holes]).buffer(-GRAIN_CLEAR)
+    lines_aside = (line + side * step * GRAIN_STEP * across for step in range(31) for side in (1, -1))
+    grain = next((each for each in lines_aside if free.contains(shapely.LineString(each))), line)
     return replace(piece, darts=drawn, grain=grain, placement=_placement(piece, result))
 
 
@@ -640,21 +640,6 @@ def _dart_places(loops: Sequence[IntArray], cut: Crack) -> tuple[int, int, int] 
             first, second = sorted(mouths, key=lambda v: (where[tip] - where[v]) % len(loop))
             return first, tip, second
     return None
-
-
-def _clear_of_holes(grain: FloatArray, piece: Piece) -> FloatArray:
-    """Move the grain line aside as far as it takes to keep off holes and fish-eye darts."""
-    import shapely
-
-    along = unit(grain[1] - grain[0])
-    across = np.array([along[1], -along[0]])
-    free = shapely.Polygon(piece.outline, [hole.points for hole in piece.holes]).buffer(-GRAIN_CLEAR)
-    for step in range(31):
-        for side in (1, -1):
-            moved = grain + side * step * GRAIN_STEP * across
-            if free.contains(shapely.LineString(moved)):
-                return moved
-    return grain
 
 
 def _edges_along(line: str, results: Sequence[Flattening], pieces: Sequence[Piece]) -> tuple[SeamSide, ...]:

@@ -237,7 +237,15 @@ def place_drafted(pattern: Pattern, garment: FormGarment) -> dict[str, list[Surf
     placed |= hang_from_edges(placed, meshed, falling)
     placed = _continued(placed, meshed, body)
     cloth = sew_meshes(meshed, fabric, placed, turned=turned)
-    cloth = _sewn_to(cloth, {*meshes} - {*drafted} | {*falling}, _dressed(solid, meshes, placed, whole))
+    # The body wears what is designed: a collar that is turned down lies on it.
+    vertices, faces = [solid.vertices], [solid.triangles]
+    for name in (name for name in meshes if name in whole):
+        triangles, count = meshes[name].triangles, sum(map(len, vertices))
+        outward = float((vertex_normals(placed[name], triangles) * solid.nearest(placed[name])[1]).sum())
+        faces.append(count + (triangles if outward > 0.0 else triangles[:, ::-1]))
+        vertices.append(placed[name])
+    dressed = Body(np.concatenate(vertices), np.concatenate(faces), device=solid.device)
+    cloth = _sewn_to(cloth, {*meshes} - {*drafted} | {*falling}, dressed)
     for name in drafted:
         title = next(each.name for each in given if name == each.name or name.startswith(each.name + " "))
         points = cloth.designed[cloth.welded[cloth.piece_vertices[name]]]
@@ -247,19 +255,6 @@ def place_drafted(pattern: Pattern, garment: FormGarment) -> dict[str, list[Surf
 
 def _length(pieces: Mapping[str, Piece], row: Sequence[SeamSide]) -> float:
     return sum(pieces[side.piece].edge(side.edge).length for side in row)
-
-
-def _dressed(
-    body: Body, meshes: Mapping[str, FlatMesh], placed: Mapping[str, FloatArray], worn: Collection[str]
-) -> Body:
-    """Return a body with pieces that it wears: a collar that is turned down lies on these."""
-    vertices, faces = [body.vertices], [body.triangles]
-    for name in (name for name in meshes if name in worn):
-        triangles, count = meshes[name].triangles, sum(map(len, vertices))
-        outward = float((vertex_normals(placed[name], triangles) * body.nearest(placed[name])[1]).sum())
-        faces.append(count + (triangles if outward > 0.0 else triangles[:, ::-1]))
-        vertices.append(placed[name])
-    return Body(np.concatenate(vertices), np.concatenate(faces), device=body.device)
 
 
 def _sewn_to(cloth: SewnCloth, stay: Collection[str], body: Body) -> SewnCloth:

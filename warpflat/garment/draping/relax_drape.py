@@ -189,8 +189,21 @@ def relax_drape(
                 energy.load_contact()
             rounds += 1
             near = left <= _NEARLY_AT_REST * options.tolerance
-            left = _minimise(energy, options.tolerance, near=near, carried=carried)
+            # A round of the augmented Lagrangian: some steps, then body and friction take over the forces that they had.
             places = energy.motion.position.numpy().copy()
+            energy.bound(places, _LONGEST_ROUND)
+            energy.factor(places, near=near)
+            descent, left = Descent(energy, energy.at(places), memory=_MEMORY), np.inf
+            ends = _ROUND_ENDS * options.tolerance
+            while descent.iterations < _STEPS_PER_ROUND and left > ends and descent.step():
+                left = energy.mean_force(descent.point)
+            left = energy.mean_force(descent.point)
+            stiffer = left <= _NEARLY_AT_REST * options.tolerance or left <= _CONTACT_LEADS * carried
+            energy.carry_contact(descent.point.positions, stiffer=stiffer)
+            energy.renew_layers()
+            energy.motion.velocity.zero_()
+            places = energy.motion.position.numpy().copy()
+            # The mean force on the planes that this round found anew.
             carried = energy.mean_force(energy.at(places))
             observe(places)
             fell_off = float(places[:, 1].max()) < lowest
@@ -204,30 +217,3 @@ def relax_drape(
         residual=residual, converged=converged, fell_off=fell_off, stalled=stalled, steps=steps, rounds=rounds,
         seconds=time.perf_counter() - began,
     )  # fmt: skip
-
-
-def _minimise(energy: DrapeEnergy, tolerance: float, *, near: bool, carried: float) -> float:
-    """Take a round of the augmented Lagrangian: some steps, then body and friction take over the forces that they had.
-
-    Args:
-        energy: of the cloth, which is moved.
-        tolerance: as of the options.
-        near: whether rest is near: the metric is softer there.
-        carried: the mean force on the planes that the round before found anew, over the mean weight of a vertex.
-
-    Returns:
-        the mean force that was left, over the mean weight of a vertex.
-    """
-    x = energy.motion.position.numpy().copy()
-    energy.bound(x, _LONGEST_ROUND)
-    energy.factor(x, near=near)
-    descent = Descent(energy, energy.at(x), memory=_MEMORY)
-    left = np.inf
-    while descent.iterations < _STEPS_PER_ROUND and left > _ROUND_ENDS * tolerance and descent.step():
-        left = energy.mean_force(descent.point)
-    left = energy.mean_force(descent.point)
-    stiffer = left <= _NEARLY_AT_REST * tolerance or left <= _CONTACT_LEADS * carried
-    energy.carry_contact(descent.point.positions, stiffer=stiffer)
-    energy.renew_layers()
-    energy.motion.velocity.zero_()
-    return left

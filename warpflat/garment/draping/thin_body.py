@@ -68,7 +68,19 @@ class ThinBody:
         self._body, self._trees = body, [body]
         vertices, triangles = body.vertices, body.triangles
         normal = vertex_normals(vertices, triangles)
-        self._inwards = _THIN * _inscribed_radius(vertices, triangles, normal)[:, None] * normal
+        # The radius of the largest ball inside the surface that touches it at each vertex, averaged over neighbours.
+        tree, radius = cKDTree(vertices), np.full(len(vertices), _LARGEST)
+        for _ in range(_ROUNDS):
+            far, near = tree.query(vertices - radius[:, None] * normal)
+            off = vertices - vertices[near]
+            height = np.einsum("ij,ij->i", off, normal)
+            smaller = np.einsum("ij,ij->i", off, off) / (2.0 * np.maximum(height, 1e-9))
+            inside = (far < radius - 1e-5) & (height > 1e-6)
+            radius = np.where(inside, np.minimum(smaller, radius), radius)
+        mean = neighbour_mean(mesh_edges(triangles), len(vertices))
+        for _ in range(_SMOOTH):
+            radius = 0.5 * radius + 0.5 * (mean @ radius)
+        self._inwards = _THIN * radius[:, None] * normal
         self._passing = np.empty(0, np.int64)
         if without is not None and passing is not None and passing.any():
             self._passing = np.flatnonzero(passing)
@@ -86,19 +98,3 @@ class ThinBody:
         if len(self._passing):
             centre[self._passing], normal[self._passing] = self._trees[1].nearest(points[self._passing])
         return centre, normal
-
-
-def _inscribed_radius(vertices: FloatArray, triangles: IntArray, normal: FloatArray) -> FloatArray:
-    """Return #V, the radius of the largest ball inside a surface that touches it at each vertex [m], averaged over neighbours."""
-    tree, radius = cKDTree(vertices), np.full(len(vertices), _LARGEST)
-    for _ in range(_ROUNDS):
-        far, near = tree.query(vertices - radius[:, None] * normal)
-        off = vertices - vertices[near]
-        height = np.einsum("ij,ij->i", off, normal)
-        smaller = np.einsum("ij,ij->i", off, off) / (2.0 * np.maximum(height, 1e-9))
-        inside = (far < radius - 1e-5) & (height > 1e-6)
-        radius = np.where(inside, np.minimum(smaller, radius), radius)
-    mean = neighbour_mean(mesh_edges(triangles), len(vertices))
-    for _ in range(_SMOOTH):
-        radius = 0.5 * radius + 0.5 * (mean @ radius)
-    return radius

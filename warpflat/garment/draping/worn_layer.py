@@ -46,7 +46,13 @@ def in_one_layer(
         The pieces and seams that are draped, and notes.
     """
     seams = list(seams)
-    out = {name for name, piece in pieces.items() if piece.role in _WITHIN or _is_binding(piece)}
+    out = {name for name, piece in pieces.items() if piece.role in _WITHIN}
+    # A binding is a strip that is turned around the edge to which it is sewn: its other edge is folded over as it is cut.
+    out |= {
+        name
+        for name, piece in pieces.items()
+        if piece.role == "strip" and any(edge.kind == "cut" and edge.allowance == 0.0 for edge in piece.edges)
+    }
     # The bag of a pocket that takes part in a seam beside the shell lies behind a cut-off corner of it, and stays.
     beside = {side.piece for seam in seams for chain in seam.sides if len(chain) > 1 for side in chain}
     out |= {name for name, piece in pieces.items() if piece.role == "pocket" and name not in beside}
@@ -77,11 +83,6 @@ def in_one_layer(
     kept = {name: piece for name, piece in kept.items() if name not in lost}
     titles = sorted({name.removesuffix(MIRRORED) for name in out | folded | lost})
     return kept, seams, [f"worn in one layer: {', '.join(titles)}"] if titles else []
-
-
-def _is_binding(piece: Piece) -> bool:
-    """Return whether a strip is turned around the edge to which it is sewn: its other edge is folded over as it is cut."""
-    return piece.role == "strip" and any(edge.kind == "cut" and edge.allowance == 0.0 for edge in piece.edges)
 
 
 def _cut_off_corners(

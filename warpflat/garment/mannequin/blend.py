@@ -229,8 +229,12 @@ def _level_moves(
 
 
 def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: tuple[Adjustment, float] | None) -> None:
-    """Move chest and shoulders with the bust's rows; neckline and shoulder seams stay."""
-    bust = layout.level_row["bust"]
+    """Move chest and shoulders with the bust's rows; neckline and shoulder seams stay.
+
+    Where the trunk's sides move outward, the armholes' lower ends move along the bisector of the fold under the arm, off trunk and arm
+    alike: out and down.
+    """
+    bust, chest_row = layout.level_row["bust"], layout.level_row["chest"]
     ids, laplacian, local = sheet_laplacian(layout, bust - 3)
     move = out - body
     held = np.zeros(len(ids), bool)
@@ -246,54 +250,33 @@ def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: tuple[
             move[row] = distance * normals + (chest[0].scale - 1.0) * (body[row] - body[row].mean(axis=0))
             held[local[row]] = True
     fill_sheet(move, layout, ids, laplacian[~held], np.flatnonzero(~held))
-    loops = _mitre_underarms(move, layout, body)
-    if loops is not None:
-        held[local[loops]] = True
+    normals = vertex_normals(body, layout.faces)
+    reach, side_reach = layout.columns[3] + len(layout.front) // 2, layout.quarter - layout.to_princess
+    around, beside = np.arange(-reach, reach + 1), np.arange(-side_reach + 1, side_reach)
+    for side, column in (("left", layout.quarter), ("right", 3 * layout.quarter)):
+        at_bust, loop = layout.rings[bust, column], layout.arms[side][0]
+        of_trunk = unit(normals[at_bust] * [1.0, 0.0, 1.0])
+        outward = float(move[at_bust] @ of_trunk)
+        if outward <= 0.0:
+            break
+        # Beyond the rounded web of the armpit.
+        bisector = unit(of_trunk + normals[layout.arms[side][layout.arm_row["biceps"] // 2, 0]])
+        wished = outward / max(float(bisector @ of_trunk), _LEAST_MITRE) * bisector
+        more = wished - move[loop[0]]
+        move[loop[around % len(loop)]] += (np.cos(0.5 * np.pi * around / (reach + 1)) ** 2)[:, None] * more
+        # The rows up to the bust share the height below an underarm that is lowered.
+        heights = body[layout.rings[: chest_row + 1, column], 1]
+        # From the underbust up; from further down where little height would be left to share.
+        far = np.flatnonzero(heights <= heights[chest_row] - _SHARED * abs(float(more[1])))
+        first = min(layout.level_row["underbust"], int(far[-1]) if len(far) else 0)
+        share = ((heights[first : bust + 1] - heights[first]) / (heights[chest_row] - heights[first]))[:, None]
+        rows = layout.rings[first : bust + 1, (column + beside) % layout.rings.shape[1]]
+        move[rows, 1] += float(more[1]) * share * smoothstep(1.0 - np.abs(beside) / side_reach)
+        held[local[loop]] = True
+    else:
         fill_sheet(move, layout, ids, laplacian[~held], np.flatnonzero(~held))
     out[ids] = body[ids] + move[ids]
     out[layout.rings[: bust + 1]] = (body + move)[layout.rings[: bust + 1]]
-
-
-def _mitre_underarms(move: FloatArray, layout: Layout, body: FloatArray) -> IntArray | None:
-    """Move the armholes' lower ends along the bisector of the fold under the arm, off trunk and arm alike: out and down.
-
-    Returns:
-        the vertices of both armholes, or None where the trunk's sides do not move outward.
-    """
-    normals = vertex_normals(body, layout.faces)
-    bust, reach = layout.rings[layout.level_row["bust"]], layout.columns[3] + len(layout.front) // 2
-    at = np.arange(-reach, reach + 1)
-    near = np.cos(0.5 * np.pi * at / (reach + 1)) ** 2
-    loops = []
-    for side, column in (("left", layout.quarter), ("right", 3 * layout.quarter)):
-        beside, loop = bust[column], layout.arms[side][0]
-        of_trunk = unit(normals[beside] * [1.0, 0.0, 1.0])
-        out = float(move[beside] @ of_trunk)
-        if out <= 0.0:
-            return None
-        # Beyond the rounded web of the armpit.
-        bisector = unit(of_trunk + normals[layout.arms[side][layout.arm_row["biceps"] // 2, 0]])
-        wished = out / max(float(bisector @ of_trunk), _LEAST_MITRE) * bisector
-        more = wished - move[loop[0]]
-        move[loop[at % len(loop)]] += near[:, None] * more
-        _lower_sides(move, layout, body, column, float(more[1]))
-        loops.append(loop)
-    return np.concatenate(loops)
-
-
-def _lower_sides(move: FloatArray, layout: Layout, body: FloatArray, column: int, lower: float) -> None:
-    """Lower the rows up to the bust at a side, so that they share the height below an underarm that is lowered by `-lower` [m]."""
-    bust, chest = layout.level_row["bust"], layout.level_row["chest"]
-    heights = body[layout.rings[: chest + 1, column], 1]
-    # From the underbust up; from further down where little height would be left to share.
-    far = np.flatnonzero(heights <= heights[chest] - _SHARED * abs(lower))
-    first = min(layout.level_row["underbust"], int(far[-1]) if len(far) else 0)
-    reach, count = layout.quarter - layout.to_princess, layout.rings.shape[1]
-    at = np.arange(-reach + 1, reach)
-    near = 1.0 - np.abs(at) / reach
-    share = ((heights[first : bust + 1] - heights[first]) / (heights[chest] - heights[first]))[:, None]
-    ids = layout.rings[first : bust + 1, (column + at) % count]
-    move[ids, 1] += lower * share * smoothstep(near)
 
 
 def _move_arms(
@@ -343,6 +326,7 @@ def _move_legs(
 ) -> None:
     """Move crotch curve and legs, with the hip's row from which they hang."""
     from scipy.interpolate import PchipInterpolator
+    from scipy.optimize import brentq
 
     curve = layout.crotch
     change = changes.get("crotch", (Adjustment(), 0.0))[0]
@@ -362,6 +346,10 @@ def _move_legs(
         out[grid[between]] = body[grid[between]] + PchipInterpolator(rows, np.stack(moves), axis=0)(between)
     move = out - body
     fill_fork(move, layout)
+
+    def too_wide(share: float, skin: FloatArray, off: FloatArray, wished: float) -> float:
+        return convex_girth(skin + share * off) - wished
+
     row_of = {level: layout.leg_row[level] for level in LEG_LEVELS[1:]}
     for grid in layout.legs.values():
         fork = grid[1 : layout.leg_row["leg_thigh"]]
@@ -371,53 +359,28 @@ def _move_legs(
         for pair in straight:
             rule_rows(out, grid, row_of, pair, body[grid[1:].reshape(-1)])
         if straight:
-            _hang_fork(out, layout, grid)
-            _take_in_thigh(out, body, grid, row_of["leg_thigh"], wished)
-
-
-def _hang_fork(out: FloatArray, layout: Layout, grid: IntArray) -> None:
-    """Let the cloth of a straight leg hang from the crotch curve to the upper thigh, along the inseam.
-
-    On the body the curve's square corner to the front becomes the thigh's round one within a few centimetres: cut like that,
-    the fork would end in a beak. Around the thigh the rows run into the straight leg in a bow, or the outseam would have a corner.
-    """
-    thigh, knee = layout.leg_row["leg_thigh"], layout.leg_row["leg_knee"]
-    ahead, behind = layout.crotch_point + layout.to_princess, len(layout.crotch) - 1 - layout.crotch_point
-    at = np.arange(grid.shape[1])
-    near = np.maximum(1.0 - at / ahead, 0.0) + np.maximum(1.0 - (len(at) - at) / behind, 0.0)
-    _hang(out, layout, grid[: thigh + round(_HANGS * (knee - thigh)) + 1], near)
-    rows = out[grid[: knee + 1]]
-    apart = float(np.linalg.norm(np.diff(rows[thigh:].mean(axis=1), axis=0), axis=1).mean())
-    ramp = np.interp(np.arange(knee + 1), [0, 0.5 * thigh, 0.5 * (thigh + knee), knee], [0.0, 1.0, 1.0, 0.0])
-    bow = smooth(rows, _THIGH_BOW / max(apart, 1e-9)) - rows
-    out[grid[1:knee]] += (smoothstep(ramp)[:, None, None] * bow)[1:knee]
-
-
-def _take_in_thigh(out: FloatArray, body: FloatArray, grid: IntArray, thigh: int, wished: float) -> None:
-    """Draw a leg that hangs towards the body at the thigh until its girth there is as wished; it stays straight down to its end.
-
-    Args:
-        out: #V by 3 [m], changed in place.
-        body: #V by 3 [m].
-        grid: of the leg, from the crotch curve down.
-        thigh: the thigh's row.
-        wished: girth there [m].
-    """
-    from scipy.optimize import brentq
-
-    skin, off = body[grid[thigh]], out[grid[thigh]] - body[grid[thigh]]
-
-    def too_wide(share: float) -> float:
-        return convex_girth(skin + share * off) - wished
-
-    if too_wide(1.0) <= 0.0 or too_wide(0.0) >= 0.0:
-        return
-    apart = np.linalg.norm(np.diff(out[grid].mean(axis=1), axis=0), axis=1)
-    below = np.cumsum(apart[thigh:])
-    up = np.arange(thigh + 1) / thigh
-    near = np.concatenate([np.sin(0.5 * np.pi * up), 1.0 - below / below[-1]])
-    taken = (1.0 - brentq(too_wide, 0.0, 1.0, xtol=1e-4)) * near
-    out[grid[1:]] -= (taken[:, None, None] * off)[1:]
+            # The cloth of a straight leg hangs from the crotch curve to the upper thigh, along the inseam. On the body the curve's square
+            # corner to the front becomes the thigh's round one within a few centimetres: cut like that, the fork would end in a beak.
+            thigh, knee = row_of["leg_thigh"], row_of["leg_knee"]
+            ahead, behind = layout.crotch_point + layout.to_princess, len(curve) - 1 - layout.crotch_point
+            at = np.arange(grid.shape[1])
+            near = np.maximum(1.0 - at / ahead, 0.0) + np.maximum(1.0 - (len(at) - at) / behind, 0.0)
+            _hang(out, layout, grid[: thigh + round(_HANGS * (knee - thigh)) + 1], near)
+            # Around the thigh the rows run into the straight leg in a bow, or the outseam would have a corner.
+            upper = out[grid[: knee + 1]]
+            apart = float(np.linalg.norm(np.diff(upper[thigh:].mean(axis=1), axis=0), axis=1).mean())
+            ramp = np.interp(np.arange(knee + 1), [0, 0.5 * thigh, 0.5 * (thigh + knee), knee], [0.0, 1.0, 1.0, 0.0])
+            bow = smooth(upper, _THIGH_BOW / max(apart, 1e-9)) - upper
+            out[grid[1:knee]] += (smoothstep(ramp)[:, None, None] * bow)[1:knee]
+            # The leg is drawn towards the body at the thigh until its girth there is as wished, and stays straight down to its end.
+            skin = body[grid[thigh]]
+            off = out[grid[thigh]] - skin
+            if too_wide(1.0, skin, off, wished) > 0.0 > too_wide(0.0, skin, off, wished):
+                below = np.cumsum(np.linalg.norm(np.diff(out[grid].mean(axis=1), axis=0), axis=1)[thigh:])
+                up = np.arange(thigh + 1) / thigh
+                share_off = np.concatenate([np.sin(0.5 * np.pi * up), 1.0 - below / below[-1]])
+                taken = (1.0 - brentq(too_wide, 0.0, 1.0, args=(skin, off, wished), xtol=1e-4)) * share_off
+                out[grid[1:]] -= (taken[:, None, None] * off)[1:]
 
 
 def _hang(out: FloatArray, layout: Layout, grid: IntArray, near: FloatArray | None = None) -> None:

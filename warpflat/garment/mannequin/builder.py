@@ -218,20 +218,36 @@ def _set_sheet(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> No
 
     bust = layout.level_row["bust"]
     ids, laplacian, local = sheet_laplacian(layout, bust - 3)
-    n = len(ids)
     known = ~np.isnan(vertices[ids, 0])
-    bounds = np.zeros(n, bool)
+    bounds = np.zeros(len(ids), bool)
+    # The across-chest rows and the centre lines above the bust guide the sheet.
+    n0, n1, n2, _ = layout.columns
+    guides, targets = list[IntArray](), list[FloatArray]()
     for name in QUARTERS:
-        neckline, _, armhole, _, _ = _quarter_ids(layout, name)
+        c = blueprint.quarters[name]
+        neckline, _, armhole, chest, centre = _quarter_ids(layout, name)
         bounds[local[neckline]] = bounds[local[armhole]] = True
+        # The princess line climbs straight up from the bust point as far as the row's width allows.
+        point = vertices[layout.lines[f"princess {name.replace('-', ' ')}"][bust], 0]
+        princess = float(np.clip(0.97 * point / c.chest[-1, 0], 0.45, 0.68))
+        guides.append(chest[:-1])
+        targets.append(_pieces(c.chest, [0.0, 0.5 * princess, princess, 1.0], [n0, n1, n2])[:-1])
+        if name.endswith("left"):
+            rise, s = layout.level_row["chest"] - bust, arc_lengths(c.centre)
+            at = s[np.argmin(np.linalg.norm(c.centre - c.chest[0], axis=1))] / s[-1]
+            line = _pieces(c.centre, [0.0, float(at), 1.0], [rise, len(centre) - 1 - rise])
+            inner = np.arange(1, len(centre) - 1)
+            inner = inner[inner != rise]
+            guides.append(centre[inner])
+            targets.append(line[inner])
     bounds[local[layout.rings[bust - 3]]] = True
     operator, free = laplacian[~bounds], np.flatnonzero(~known)
-    guides, targets = _guides(vertices, layout, blueprint)
     weight = _GUIDE * (layout.resolution / 0.010) ** 1.5
 
     def guided(weight: float) -> tuple[Any, FloatArray]:
-        guide = weight * sparse.identity(n).tocsr()[local[guides]]
-        return sparse.vstack([operator, guide]), np.vstack([np.zeros((operator.shape[0], 3)), weight * targets])
+        guide = weight * sparse.identity(len(ids)).tocsr()[local[np.concatenate(guides)]]
+        target = np.vstack([np.zeros((operator.shape[0], 3)), weight * np.concatenate(targets)])
+        return sparse.vstack([operator, guide]), target
 
     # The first sheet follows the guides alone: there is none yet to draw to the body.
     matrix, target = guided(5.0 * weight)
@@ -241,32 +257,6 @@ def _set_sheet(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> No
         fill_sheet(
             vertices, layout, ids, matrix, free, target=target, attract=blueprint.attract, rounds=_ATTRACT_ROUNDS
         )
-
-
-def _guides(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> tuple[IntArray, FloatArray]:
-    """Return vertices of the across-chest rows and the centre lines above the bust, and where they should lie."""
-    n0, n1, n2, _ = layout.columns
-    ids: list[IntArray] = []
-    places: list[FloatArray] = []
-    for name in QUARTERS:
-        c = blueprint.quarters[name]
-        _, _, _, chest, centre = _quarter_ids(layout, name)
-        # The princess line climbs straight up from the bust point as far as the row's width allows.
-        point = vertices[layout.lines[f"princess {name.replace('-', ' ')}"][layout.level_row["bust"]], 0]
-        princess = float(np.clip(0.97 * point / c.chest[-1, 0], 0.45, 0.68))
-        row = _pieces(c.chest, [0.0, 0.5 * princess, princess, 1.0], [n0, n1, n2])
-        ids.append(chest[:-1])
-        places.append(row[:-1])
-        if name.endswith("left"):
-            rise = layout.level_row["chest"] - layout.level_row["bust"]
-            s = arc_lengths(c.centre)
-            at = s[np.argmin(np.linalg.norm(c.centre - c.chest[0], axis=1))] / s[-1]
-            line = _pieces(c.centre, [0.0, float(at), 1.0], [rise, len(centre) - 1 - rise])
-            inner = np.arange(1, len(centre) - 1)
-            inner = inner[inner != rise]
-            ids.append(centre[inner])
-            places.append(line[inner])
-    return np.concatenate(ids).astype(np.int32), np.concatenate(places)
 
 
 def set_legs(vertices: FloatArray, layout: Layout, legs: LegCurves) -> None:

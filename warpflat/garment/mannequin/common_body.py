@@ -100,9 +100,32 @@ class CommonBody:
             vertices = vertices + np.outer(np.where(places.strips["arms"], 0.0, move), [0.0, 1.0, 0.0])
             vertices, _ = lay_on_scan(vertices, mesh)
             heights = vertices[:, 1]
-        # So would the ends of its shoulders and its underarms: a table may have both where no body of that girth has them.
+        # So would the ends of its shoulders and its underarms: a table may have both where no body of that girth has them. An armhole lies
+        # on the trunk, and the model's arm begins beside it, farther in at the top: as far as on a woman of EU 38.
+        corners = finer_body()[1]
+        ends = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+        still = places.strips["leg left"] | places.strips["leg right"] | places.strips["head"]
         for _ in range(_MOVES):
-            vertices, _ = lay_on_scan(vertices + _towards_armholes(vertices, mannequin), mesh)
+            moves = np.zeros_like(vertices)
+            for side, sign in (("left", 1.0), ("right", -1.0)):
+                arm = places.strips[f"arm {side}"]
+                across = ends[arm[ends[:, 0]] != arm[ends[:, 1]]]
+                hole, begins = mannequin.line(f"armhole {side}"), vertices[across].mean(axis=1)
+                top, from_top = hole[hole[:, 1].argmax()], begins[begins[:, 1].argmax()]
+                low, from_low = hole[hole[:, 1].argmin()], begins[begins[:, 1].argmin()]
+                at_top = np.array([top[0] - from_top[0] - sign * _BESIDE_ARM[0], 0.0, 0.0])
+                at_low = np.array([
+                    low[0] - from_low[0] - sign * _BESIDE_ARM[1], low[1] - from_low[1] - _BESIDE_ARM[2], 0.0,
+                ])  # fmt: skip
+                height = (vertices[:, 1] - from_low[1]) / max(float(from_top[1] - from_low[1]), 1e-9)
+                # Arms go along as they are; the trunk follows the more, the farther out it is, down to a hand's length below the underarm.
+                out = np.clip(sign * vertices[:, 0] / abs(from_top[0]), 0.0, 1.0) ** 2
+                follows = out * np.clip(1.0 - (from_low[1] - vertices[:, 1]) / _BELOW_ARM, 0.0, 1.0)
+                follows[still] = 0.0
+                follows[arm] = 1.0
+                follows[sign * vertices[:, 0] <= 0.0] = 0.0
+                moves += follows[:, None] * (at_low + np.clip(height, 0.0, 1.0)[:, None] * (at_top - at_low))
+            vertices, _ = lay_on_scan(vertices + moves, mesh)
         far = float(fit.distance[np.isfinite(fit.distance)].mean())
         return cls(name=name, person=fit.person, vertices=vertices, far=far)
 
@@ -148,31 +171,3 @@ class CommonBody:
             turn=other.turn,
             shift=other.shift,
         )
-
-
-def _towards_armholes(vertices: FloatArray, mannequin: Mannequin) -> FloatArray:
-    """Return the moves, #V by 3 [m], that bring the ends of shoulders sideways and underarms to where a mannequin has its armholes.
-
-    An armhole lies on the trunk, and the model's arm begins beside it, farther in at the top: as far as on a woman of EU 38. Arms go along
-    as they are; the trunk follows the more, the farther out it is, down to a hand's length below the underarm.
-    """
-    places, triangles = model_places(), finer_body()[1]
-    ends = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    move = np.zeros_like(vertices)
-    for side, sign in (("left", 1.0), ("right", -1.0)):
-        arm = places.strips[f"arm {side}"]
-        across = ends[arm[ends[:, 0]] != arm[ends[:, 1]]]
-        hole, begins = mannequin.line(f"armhole {side}"), vertices[across].mean(axis=1)
-        (top, low), (from_top, from_low) = (
-            (row[row[:, 1].argmax()], row[row[:, 1].argmin()]) for row in (hole, begins)
-        )
-        at_top = np.array([top[0] - from_top[0] - sign * _BESIDE_ARM[0], 0.0, 0.0])
-        at_low = np.array([low[0] - from_low[0] - sign * _BESIDE_ARM[1], low[1] - from_low[1] - _BESIDE_ARM[2], 0.0])
-        height = (vertices[:, 1] - from_low[1]) / max(float(from_top[1] - from_low[1]), 1e-9)
-        out = np.clip(sign * vertices[:, 0] / abs(from_top[0]), 0.0, 1.0) ** 2
-        follows = out * np.clip(1.0 - (from_low[1] - vertices[:, 1]) / _BELOW_ARM, 0.0, 1.0)
-        follows[places.strips["leg left"] | places.strips["leg right"] | places.strips["head"]] = 0.0
-        follows[arm] = 1.0
-        follows[sign * vertices[:, 0] <= 0.0] = 0.0
-        move += follows[:, None] * (at_low + np.clip(height, 0.0, 1.0)[:, None] * (at_top - at_low))
-    return move

@@ -137,7 +137,15 @@ def place_darts(
             raise InputError(f"{where}: line {dart.line!r} does not run from the border into piece {dart.piece!r}")
         point: int | None = None
         if dart.part is not None:
-            row = _part_of(vertices, run, dart)
+            low, high = dart.part
+            if low == high:
+                raise InputError(f"{where}: part = [{low:g}, {high:g}] has no length; give two different shares")
+            # A dart from the end of the run has its mouth there.
+            if 1.0 in (low, high):
+                run, low, high = run[::-1], 1.0 - low, 1.0 - high
+            arc = arc_lengths(vertices[run])
+            begin, end = (int(np.abs(arc - share * arc[-1]).argmin()) for share in sorted((low, high)))
+            row = run[begin : max(begin + 1, end) + 1]
         elif dart.at is None and (waist := _waist_of_fisheye(layout, run)) is not None:
             row = _default_fisheye(layout, vertices, run, waist, dart)
         else:
@@ -246,24 +254,6 @@ def grid_line(layout: Layout, dart: FormDart) -> list[int]:
 def longest_run(line: Sequence[int], cloth: _Cloth) -> list[int]:
     """Return the longest stretch of a line inside a piece."""
     return max(joined_runs(edge for edge in itertools.pairwise(line) if edge in cloth.inner), key=len, default=[])
-
-
-def _part_of(vertices: FloatArray, run: list[int], dart: FormDart) -> list[int]:
-    """Return the part of a run between two shares of its length, from the mouth, or from tip to tip.
-
-    Raises:
-        InputError: the shares are the same.
-    """
-    assert dart.part is not None
-    first, last = dart.part
-    if first == last:
-        raise InputError(f"dart {dart.name!r}: part = [{first:g}, {last:g}] has no length; give two different shares")
-    if 1.0 in (first, last):
-        run, first, last = run[::-1], 1.0 - first, 1.0 - last
-    first, last = sorted((first, last))
-    arc = arc_lengths(vertices[run])
-    begin, end = (int(np.abs(arc - share * arc[-1]).argmin()) for share in (first, last))
-    return run[begin : max(begin + 1, end) + 1]
 
 
 def _waist_of_fisheye(layout: Layout, run: Sequence[int]) -> int | None:

@@ -106,8 +106,22 @@ def fit_body(
     given = np.array([height_weights(name) for name in heights]).reshape(-1, model.count)
     used = np.flatnonzero(given.any(axis=0))
     known = _Known(model=model.only(used), weights=given[:, used], heights=np.array([*heights.values()]))
-    seats = _SEATS if sits else ((0.0, 0.0),)
-    started = [(_start(model, vertices, arms, seat), np.inf) for seat in seats for arms in _ARMS]
+    # It starts from mean bodies, as tall as the scan and in its place, with their arms, and their hips and knees, bent.
+    low, high, started = vertices.min(axis=0), vertices.max(axis=0), list[tuple[Person, float]]()
+    for seat in _SEATS if sits else ((0.0, 0.0),):
+        for arms in _ARMS:
+            person = model.mean_person(arms, seat)
+            person = replace(person, scale=float((high[1] - low[1]) / np.ptp(model.vertices(person)[:, 1])))
+            posed = model.vertices(person)
+            place = np.array([
+                0.5 * (low[0] + high[0]) - 0.5 * (posed[:, 0].min() + posed[:, 0].max()),
+                low[1] - posed[:, 1].min(),
+                # Arms and feet may reach anywhere, but the knees of a body that sits are before its trunk.
+                np.median(vertices[:, 2]) - np.median(posed[:, 2])
+                if seat == (0.0, 0.0)
+                else 0.5 * (low[2] + high[2]) - 0.5 * (posed[:, 2].min() + posed[:, 2].max()),
+            ])  # fmt: skip
+            started.append((replace(person, place=place), np.inf))
     for steps, preference, reach, shapes, keep in _FIRST:
         for i, (person, cost) in enumerate(started):
             for _ in range(steps):
@@ -125,22 +139,6 @@ def fit_body(
     alike = np.einsum("va,va->v", vertex_normals(posed, model.triangles), mesh.normals_at(found, weights)) > _ALIKE
     distance = np.where(alike, np.linalg.norm(posed - place, axis=1), np.inf)
     return FittedBody(person=person, distance=distance, cost=cost)
-
-
-def _start(model: BodyModel, vertices: FloatArray, arms: float, seat: tuple[float, float]) -> Person:
-    """Return the mean body, as tall as the scan and in its place, with its arms, and its hips and knees, bent [rad]."""
-    low, high, person = vertices.min(axis=0), vertices.max(axis=0), model.mean_person(arms, seat)
-    person = replace(person, scale=float((high[1] - low[1]) / np.ptp(model.vertices(person)[:, 1])))
-    posed = model.vertices(person)
-    place = np.array([
-        0.5 * (low[0] + high[0]) - 0.5 * (posed[:, 0].min() + posed[:, 0].max()),
-        low[1] - posed[:, 1].min(),
-        # Arms and feet may reach anywhere, but the knees of a body that sits are before its trunk.
-        np.median(vertices[:, 2]) - np.median(posed[:, 2])
-        if seat == (0.0, 0.0)
-        else 0.5 * (low[2] + high[2]) - 0.5 * (posed[:, 2].min() + posed[:, 2].max()),
-    ])  # fmt: skip
-    return replace(person, place=place)
 
 
 def _step(

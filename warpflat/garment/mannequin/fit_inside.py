@@ -56,10 +56,16 @@ def fit_inside(vertices: FloatArray, triangles: NDArray[np.int64]) -> FittedBody
     coarse_rows, fine_rows = (skin[:: max(1, len(skin) // count)] for count in (FEW, _VERTICES))
     coarse, fine = model.only(coarse_rows), model.only(fine_rows)
     height, top = float(np.ptp(vertices[:, 1])), float(vertices[:, 1].max())
+    # It starts from mean bodies of the usual stature with their soles at several heights, amid the garment, their arms bent.
+    mean = model.mean[: model.count]
+    scale = _STATURE / float(np.ptp(mean[:, 1]))
+    across = 0.5 * (vertices[:, 0].min() + vertices[:, 0].max())
+    ahead = float(np.median(points[:, 2])) - scale * float(np.median(mean[:, 2]))
     started: list[tuple[Person, float]] = []
     for arms in _ARMS:
         for share_of in np.arange(max(_TOPS[0], min(height / _STATURE, _TOPS[1])), _TOPS[1] + 1e-9, _TOP_STEP):
-            person, cost = _start(model, vertices, points, arms, top - float(share_of) * _STATURE), np.inf
+            place = np.array([across, top - float(share_of) * _STATURE - scale * float(mean[:, 1].min()), ahead])
+            person, cost = replace(model.mean_person(-arms), scale=scale, place=place), np.inf
             for _ in range(_FIRST[0]):
                 person, cost = _step(coarse, of_skin[coarse_rows], points[few], normals[few], person, *_FIRST[1:])
             started.append((person, cost))
@@ -74,18 +80,6 @@ def fit_inside(vertices: FloatArray, triangles: NDArray[np.int64]) -> FittedBody
         person, cost = _step(fine, of_skin[fine_rows], points, normals, person, *_LAST[1:])
     distance = np.linalg.norm(Mesh(model.vertices(person), model.triangles).closest(points)[2] - points, axis=1)
     return FittedBody(person=person, distance=distance, cost=cost)
-
-
-def _start(model: BodyModel, vertices: FloatArray, points: FloatArray, arms: float, floor: float) -> Person:
-    """Return the mean body of the usual stature with its soles at a height, amid the garment, its arms bent."""
-    mean = model.mean[: model.count]
-    scale = _STATURE / float(np.ptp(mean[:, 1]))
-    place = np.array([
-        0.5 * (vertices[:, 0].min() + vertices[:, 0].max()),
-        floor - scale * float(mean[:, 1].min()),
-        float(np.median(points[:, 2])) - scale * float(np.median(mean[:, 2])),
-    ])  # fmt: skip
-    return replace(model.mean_person(-arms), scale=scale, place=place)
 
 
 def _step(

@@ -57,45 +57,6 @@ def find_seams(pieces: Mapping[str, FormPiece]) -> tuple[FormSeam, ...]:
 
     A seam that darts interrupt is one seam of several runs. The legs of darts belong to none.
     """
-    found: dict[tuple[str, str, str, str], list[SeamRun]] = {}
-    for names, run in _runs(pieces):
-        whole = [pieces[name].whole(edge) for name, edge in zip(names, run.edges, strict=True)]
-        found.setdefault((names[0], names[1], whole[0], whole[1]), []).append(run)
-    rows = [(sides, tuple(chain)) for sides, runs in found.items() for chain in _chains(pieces[sides[0]], runs)]
-    called = name_seams(
-        [unnumbered(edge) for (_, _, edge, _), _ in rows],
-        [(first, second) for (first, second, _, _), _ in rows],
-        [pieces[first].surface.vertices[np.concatenate([run.vertices[0] for run in chain])]
-         for (first, _, _, _), chain in rows],
-    )  # fmt: skip
-    return tuple(
-        FormSeam(name=name, pieces=(first, second), edges=(edge, other), runs=chain)
-        for name, ((first, second, edge, other), chain) in zip(called, rows, strict=True)
-    )
-
-
-def _chains(piece: FormPiece, runs: Sequence[SeamRun]) -> list[list[SeamRun]]:
-    """Join runs that follow each other on the mannequin; what lies between them is closed darts."""
-    ends = [[int(piece.grid_vertices[run.vertices[0][at]]) for at in (0, -1)] for run in runs]
-    follower = {start: number for number, (start, _) in enumerate(ends)}
-    later = {follower[end] for _, end in ends if end in follower}
-    chains: list[list[SeamRun]] = []
-    done: set[int] = set()
-    # A closed ring of runs has no first one: it begins anywhere.
-    for number in [*(n for n in range(len(runs)) if n not in later), *range(len(runs))]:
-        chain: list[SeamRun] = []
-        at: int | None = number
-        while at is not None and at not in done:
-            done.add(at)
-            chain.append(runs[at])
-            at = follower.get(ends[at][1])
-        if chain:
-            chains.append(chain)
-    return chains
-
-
-def _runs(pieces: Mapping[str, FormPiece]) -> list[tuple[tuple[str, str], SeamRun]]:
-    """Return the stretches along which one edge is sewn to one edge, with the names of the two pieces."""
     places: dict[tuple[int, int], list[_Place]] = {}
     for name, piece in pieces.items():
         legs = piece.leg_edges
@@ -106,7 +67,7 @@ def _runs(pieces: Mapping[str, FormPiece]) -> list[tuple[tuple[str, str], SeamRu
                 places.setdefault((min(a, b), max(a, b)), []).append((name, edge, i))
     # In the order of the first sides.
     pairs = {sides[0]: sides[1] for sides in places.values() if len(sides) == 2}
-    found: list[tuple[tuple[str, str], SeamRun]] = []
+    runs: list[tuple[tuple[str, str], SeamRun]] = []
     row: list[tuple[_Place, _Place]] = []
     for name, piece in pieces.items():
         for edge, ids in piece.edges.items():
@@ -122,11 +83,44 @@ def _runs(pieces: Mapping[str, FormPiece]) -> list[tuple[tuple[str, str], SeamRu
                     and abs(other[2] - last[1][2]) == 1
                 )
                 if row and not goes_on:
-                    found.append(_run(pieces, row))
+                    runs.append(_run(pieces, row))
                     row = []
                 if other is not None:
                     row.append((here, other))
-    return [*found, _run(pieces, row)] if row else found
+    if row:
+        runs.append(_run(pieces, row))
+    of_edges: dict[tuple[str, str, str, str], list[SeamRun]] = {}
+    for names, run in runs:
+        whole = [pieces[name].whole(edge) for name, edge in zip(names, run.edges, strict=True)]
+        of_edges.setdefault((names[0], names[1], whole[0], whole[1]), []).append(run)
+    # Runs that follow each other on the mannequin are one seam; what lies between them is closed darts.
+    rows: list[tuple[tuple[str, str, str, str], tuple[SeamRun, ...]]] = []
+    for sides, alike in of_edges.items():
+        on_grid = pieces[sides[0]].grid_vertices
+        ends = [[int(on_grid[run.vertices[0][at]]) for at in (0, -1)] for run in alike]
+        follower = {start: number for number, (start, _) in enumerate(ends)}
+        later = {follower[end] for _, end in ends if end in follower}
+        done: set[int] = set()
+        # A closed ring of runs has no first one: it begins anywhere.
+        for number in [*(n for n in range(len(alike)) if n not in later), *range(len(alike))]:
+            chain: list[SeamRun] = []
+            at: int | None = number
+            while at is not None and at not in done:
+                done.add(at)
+                chain.append(alike[at])
+                at = follower.get(ends[at][1])
+            if chain:
+                rows.append((sides, tuple(chain)))
+    called = name_seams(
+        [unnumbered(edge) for (_, _, edge, _), _ in rows],
+        [(first, second) for (first, second, _, _), _ in rows],
+        [pieces[first].surface.vertices[np.concatenate([run.vertices[0] for run in chain])]
+         for (first, _, _, _), chain in rows],
+    )  # fmt: skip
+    return tuple(
+        FormSeam(name=name, pieces=(first, second), edges=(edge, other), runs=chain)
+        for name, ((first, second, edge, other), chain) in zip(called, rows, strict=True)
+    )
 
 
 def _run(pieces: Mapping[str, FormPiece], row: Sequence[tuple[_Place, _Place]]) -> tuple[tuple[str, str], SeamRun]:

@@ -391,28 +391,19 @@ def realise(
     ]
     waist = RING_LEVELS.index("waist")
     alike = {level for level, change in form.profiles.items() if change.like is not None}
-    ease = {
-        level: cm
-        for level, cm in form.ease.items()
-        if level in RING_LEVELS
-        and level not in alike
-        and not any(low < RING_LEVELS.index(level) < high for low, high in spans)
-        and not (
-            any(low <= RING_LEVELS.index(level) and high < waist for low, high in spans)
-            and _hangs(layout, body, vertices, level, cm)
-        )
-    }
+    ease: dict[str, float] = {}
+    for level, cm in form.ease.items():
+        at = RING_LEVELS.index(level) if level in RING_LEVELS and level not in alike else None
+        if at is None or any(low < at < high for low, high in spans):
+            continue
+        row = layout.rings[layout.level_row[level]]
+        may_hang = at < waist and any(low <= at and high < waist for low, high in spans)
+        if not may_hang or convex_girth(vertices[row]) <= convex_girth(body[row]) + 0.01 * cm + _HANGS:
+            ease[level] = cm
     return FormResult(
         name=form.name, recipe=form, body=body, half=half,
         vertices=vertices, pieces=pieces, seams=find_seams(pieces), darts=placed, ease=ease, layout=layout, bricks=bricks,
     )  # fmt: skip
-
-
-def _hangs(layout: Layout, body: FloatArray, vertices: FloatArray, level: str, ease_cm: float) -> bool:
-    """Return whether the cloth at a level below the waist hangs farther out than its ease asks for."""
-    row = layout.rings[layout.level_row[level]]
-    below = RING_LEVELS.index(level) < RING_LEVELS.index("waist")
-    return below and convex_girth(vertices[row]) > convex_girth(body[row]) + 0.01 * ease_cm + _HANGS
 
 
 def _rows_of(placed: Sequence[PlacedDart]) -> dict[str, dict[str, IntArray]]:

@@ -38,8 +38,8 @@ def check_halves(pieces: Mapping[str, Cut]) -> None:
     """
     used = {b for bricks, _, _ in pieces.values() for b in bricks}
     for name, (bricks, datum, opened) in pieces.items():
+        image = {_mirrored(b) for b in bricks}
         if lies_on_both(bricks):
-            image = {_mirrored(b) for b in bricks}
             if image != set(bricks):
                 lone = [b for b in bricks if b not in image]
                 raise InputError(
@@ -48,7 +48,13 @@ def check_halves(pieces: Mapping[str, Cut]) -> None:
                 )
             partner = name
         else:
-            partner = _mirror_image(name, bricks, pieces, used)
+            found = next((other for other, (theirs, _, _) in pieces.items() if set(theirs) == image), None)
+            if found is None:
+                lone = [b for b in bricks if _mirrored(b) not in used] or list(bricks)
+                raise InputError(
+                    f"form: half = true mirrors the left half, but no piece is the mirror image of piece {name} ({_listed(lone)}); {_WHOLE}"
+                )
+            partner = found
         _, their_datum, theirs = pieces[partner]
         lines = [line for line in opened if _mirrored(line) not in theirs]
         if lines:
@@ -61,22 +67,6 @@ def check_halves(pieces: Mapping[str, Cut]) -> None:
                 f"form: half = true mirrors the left half, but piece {name} has its datum along {datum!r} and piece {partner} "
                 f"along {their_datum!r}; make them mirror images, or {_WHOLE}"
             )
-
-
-def _mirror_image(name: str, bricks: Sequence[str], pieces: Mapping[str, Cut], used: set[str]) -> str:
-    """Return the piece that is the mirror image of one on one side of the body; `used` are the bricks of all pieces.
-
-    Raises:
-        InputError: there is none.
-    """
-    image = {_mirrored(b) for b in bricks}
-    for other, (theirs, _, _) in pieces.items():
-        if set(theirs) == image:
-            return other
-    lone = [b for b in bricks if _mirrored(b) not in used] or list(bricks)
-    raise InputError(
-        f"form: half = true mirrors the left half, but no piece is the mirror image of piece {name} ({_listed(lone)}); {_WHOLE}"
-    )
 
 
 def fold_among(edges: Iterable[str], opened: Sequence[str], name: str) -> str:

@@ -196,14 +196,51 @@ def make_layout(resolution_mm: float = 10.0) -> Layout:
     if not 2.0 <= resolution_mm <= 40.0:
         raise InputError(f"mannequin resolution {resolution_mm:g} mm: valid range 2 to 40 mm")
     strips = _strips(resolution_mm / 1000.0)
+    # Feature profiles (closed around the body or an arm) and feature lines, bottom up.
+    n0, n1, n2, _ = strips.columns
+    p, k, q = strips.to_princess, strips.to_arm, strips.quarter
+    rings, front, back, yokes, neck = strips.rings, strips.front, strips.back, strips.yokes, strips.neck
+
+    def loop(ids: IntArray) -> IntArray:
+        return np.append(ids, ids[:1])
+
+    lines = {level: loop(rings[strips.level_row[level]]) for level in RING_LEVELS}
+    lines |= {"chest front": front[0], "chest back": back[0]}
+    lines |= {"yoke front left": front[-1, k + n0 :], "yoke front right": front[-1, : k - n0 + 1]}
+    lines |= {"yoke back left": back[-1, : k - n0 + 1], "yoke back right": back[-1, k + n0 :]}
+    lines |= {"neck": loop(neck[0]), "collar": loop(neck[-1])}
+    lines |= {"shoulder left": yokes["front-left"][-1], "shoulder right": yokes["front-right"][-1][::-1]}
+    lines["centre front"] = np.concatenate([rings[:, 0], front[1:, k], neck[1:, 0]])
+    lines["centre back"] = np.concatenate([rings[:, 2 * q], back[1:, k], neck[1:, neck.shape[1] // 2]])
+    lines["side left"], lines["side right"] = rings[:, q], rings[:, 3 * q]
+    for name, column, patch, at, up in (
+        ("princess front left", p, front, k + p, yokes["front-left"][:, n1]),
+        ("princess front right", 4 * q - p, front, k - p, yokes["front-right"][:, n2]),
+        ("princess back left", 2 * q - p, back, k - p, yokes["back-left"][:, n2]),
+        ("princess back right", 2 * q + p, back, k + p, yokes["back-right"][:, n1]),
+    ):
+        lines[name] = np.concatenate([rings[:, column], patch[1:, at], up[1:]])
+    for side, grid in strips.arms.items():
+        for level in ARM_LEVELS:
+            lines[f"{level} {side}"] = loop(grid[strips.arm_row[level]])
+        lines[f"underarm {side}"] = grid[:, 0]
+        lines[f"overarm {side}"] = grid[:, grid.shape[1] // 2]
+    lines["crotch front"] = strips.crotch[: strips.crotch_point + 1]
+    lines["crotch back"] = strips.crotch[strips.crotch_point :]
+    for side, grid in strips.legs.items():
+        lines |= {f"{line} {side}": loop(grid[strips.leg_row[level]]) for level, line in LEG_LINES.items()}
+        lines[f"inseam {side}"], lines[f"outseam {side}"] = grid[:, 0], grid[:, strips.to_outseam]
+        lines[f"crease front {side}"] = grid[:, strips.to_outseam - q + p]
+        lines[f"crease back {side}"] = grid[:, strips.to_outseam + q - p]
     bricks = _bricks(strips)
     quads = [grid_quads(grid) for grid in bricks.values()]
     face_brick = np.repeat(np.arange(len(bricks)), [len(each) for each in quads])
     tube = set(strips.rings[: strips.level_row["hip"]].ravel().tolist())
     around = [bool(tube & set(grid.ravel().tolist())) for grid in bricks.values()]
     return Layout(
-        **vars(strips), bricks=bricks, lines=_lines(strips), faces=np.concatenate(quads).astype(np.int32),
-        face_brick=face_brick.astype(np.int32), on_body=~np.array(around)[face_brick],
+        **vars(strips), bricks=bricks, lines={name: np.ascontiguousarray(ids, np.int32) for name, ids in lines.items()},
+        faces=np.concatenate(quads).astype(np.int32), face_brick=face_brick.astype(np.int32),
+        on_body=~np.array(around)[face_brick],
     )  # fmt: skip
 
 
@@ -351,43 +388,3 @@ def _limb_bricks(
             # Columns run forward from the inside on both sides; the left one's rows are turned, so that it faces outward too.
             bricks[f"{high}-{low}/{limb}-{side}-{name}"] = part[::-1] if side == "left" else part
     return bricks
-
-
-def _lines(strips: Strips) -> dict[str, IntArray]:
-    """Return feature profiles (closed around the body or an arm) and feature lines, bottom up."""
-    n0, n1, n2, _ = strips.columns
-    p, k, q = strips.to_princess, strips.to_arm, strips.quarter
-    rings, front, back, yokes, neck = strips.rings, strips.front, strips.back, strips.yokes, strips.neck
-
-    def loop(ids: IntArray) -> IntArray:
-        return np.append(ids, ids[:1])
-
-    lines = {level: loop(rings[strips.level_row[level]]) for level in RING_LEVELS}
-    lines |= {"chest front": front[0], "chest back": back[0]}
-    lines |= {"yoke front left": front[-1, k + n0 :], "yoke front right": front[-1, : k - n0 + 1]}
-    lines |= {"yoke back left": back[-1, : k - n0 + 1], "yoke back right": back[-1, k + n0 :]}
-    lines |= {"neck": loop(neck[0]), "collar": loop(neck[-1])}
-    lines |= {"shoulder left": yokes["front-left"][-1], "shoulder right": yokes["front-right"][-1][::-1]}
-    lines["centre front"] = np.concatenate([rings[:, 0], front[1:, k], neck[1:, 0]])
-    lines["centre back"] = np.concatenate([rings[:, 2 * q], back[1:, k], neck[1:, neck.shape[1] // 2]])
-    lines["side left"], lines["side right"] = rings[:, q], rings[:, 3 * q]
-    for name, column, patch, at, up in (
-        ("princess front left", p, front, k + p, yokes["front-left"][:, n1]),
-        ("princess front right", 4 * q - p, front, k - p, yokes["front-right"][:, n2]),
-        ("princess back left", 2 * q - p, back, k - p, yokes["back-left"][:, n2]),
-        ("princess back right", 2 * q + p, back, k + p, yokes["back-right"][:, n1]),
-    ):
-        lines[name] = np.concatenate([rings[:, column], patch[1:, at], up[1:]])
-    for side, grid in strips.arms.items():
-        for level in ARM_LEVELS:
-            lines[f"{level} {side}"] = loop(grid[strips.arm_row[level]])
-        lines[f"underarm {side}"] = grid[:, 0]
-        lines[f"overarm {side}"] = grid[:, grid.shape[1] // 2]
-    lines["crotch front"] = strips.crotch[: strips.crotch_point + 1]
-    lines["crotch back"] = strips.crotch[strips.crotch_point :]
-    for side, grid in strips.legs.items():
-        lines |= {f"{line} {side}": loop(grid[strips.leg_row[level]]) for level, line in LEG_LINES.items()}
-        lines[f"inseam {side}"], lines[f"outseam {side}"] = grid[:, 0], grid[:, strips.to_outseam]
-        lines[f"crease front {side}"] = grid[:, strips.to_outseam - q + p]
-        lines[f"crease back {side}"] = grid[:, strips.to_outseam + q - p]
-    return {name: np.ascontiguousarray(ids, np.int32) for name, ids in lines.items()}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -108,7 +107,29 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
     surface = _Surface(vertices, quads)
     neckline = neckline.in_cm(layout, vertices)
     seams, centres = [layout.lines[f"shoulder {side}"] for side in ("left", "right")], _centres(layout)
-    out = _with_neckline(layout, vertices, neckline, quads, seams, centres)
+    out, neck, side = vertices.copy(), layout.neck[0], 0.01 * neckline.side_cm
+    for seam in seams:
+        # The seam begins later; its outer end stays.
+        at = arc_lengths(vertices[seam])
+        if side > at[-1] - 0.02:
+            raise InputError(f"neckline: side_cm is {100 * side:g}, but the shoulder is {100 * at[-1]:.1f} cm long")
+        out[seam] = points_at_lengths(vertices[seam], side + (at[-1] - side) * at / at[-1])
+    for face, patch, depth_cm in (("front", layout.front, neckline.front_cm), ("back", layout.back, neckline.back_cm)):
+        patches = [patch, *(layout.yokes[f"{face}-{each}"] for each in ("left", "right"))]
+        half = _Surface(vertices, quads[np.isin(quads, np.concatenate([p.ravel() for p in patches])).all(axis=1)])
+        top, depth = centres[face][0], 0.01 * depth_cm
+        out[top] = points_at_lengths(vertices[centres[face]], [depth])[0]
+        for seam in seams:
+            # The shorter part of the neck's closed row between the centre line and the seam.
+            first, last = (int(np.flatnonzero(neck == vertex)[0]) for vertex in (top, seam[0]))
+            parts = (np.arange((last - first) % len(neck) + 1), -np.arange((first - last) % len(neck) + 1))
+            quarter = np.asarray(neck[(first + min(parts, key=len)) % len(neck)])
+            ends = out[quarter[0]], out[quarter[-1]]
+            if face == "back":
+                out[quarter] = half.beside(vertices[quarter], depth, side, ends)
+            else:
+                share = arc_lengths(vertices[quarter]) / arc_lengths(vertices[quarter])[-1]
+                out[quarter[1:-1]] = half.superellipse(share[1:-1], neckline.front_power, ends)
     fixed = [layout.neck[0], *seams, layout.rings[layout.level_row["bust"]], *(arm[0] for arm in layout.arms.values())]
     moved = np.setdiff1d(ids, np.concatenate(fixed))
     upright, few = _corners_upright(vertices, quads), (_FOLDED if neckline.is_round else 0.0) * quads.size
@@ -151,55 +172,6 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
 def _centres(layout: Layout) -> dict[str, IntArray]:
     """Return the centre lines in front and behind, from the base of the neck down to the ankle."""
     return {face: layout.lines[f"centre {face}"][-len(layout.neck) :: -1] for face in ("front", "back")}
-
-
-def _with_neckline(
-    layout: Layout,
-    vertices: FloatArray,
-    neckline: Neckline,
-    quads: IntArray,
-    seams: Sequence[IntArray],
-    centres: Mapping[str, IntArray],
-) -> FloatArray:
-    """Return a form's vertices with neck's row and shoulder seams where the neckline has them, all others as they are.
-
-    Args:
-        layout, vertices: of the form, #V by 3 [m].
-        neckline: without shares.
-        quads: of chest, back and shoulders.
-        seams: at the shoulders, from the neck.
-        centres: the centre lines in front and behind, from the neck down.
-
-    Raises:
-        InputError: the neckline takes a whole shoulder seam.
-    """
-    out, neck, side = vertices.copy(), layout.neck[0], 0.01 * neckline.side_cm
-    for seam in seams:
-        # The seam begins later; its outer end stays.
-        at = arc_lengths(vertices[seam])
-        if side > at[-1] - 0.02:
-            raise InputError(f"neckline: side_cm is {100 * side:g}, but the shoulder is {100 * at[-1]:.1f} cm long")
-        out[seam] = points_at_lengths(vertices[seam], side + (at[-1] - side) * at / at[-1])
-    for face, patch, depth in (
-        ("front", layout.front, 0.01 * neckline.front_cm),
-        ("back", layout.back, 0.01 * neckline.back_cm),
-    ):
-        patches = [patch, *(layout.yokes[f"{face}-{each}"] for each in ("left", "right"))]
-        half = _Surface(vertices, quads[np.isin(quads, np.concatenate([p.ravel() for p in patches])).all(axis=1)])
-        top = centres[face][0]
-        out[top] = points_at_lengths(vertices[centres[face]], [depth])[0]
-        for seam in seams:
-            # The shorter part of the neck's closed row between the centre line and the seam.
-            first, last = (int(np.flatnonzero(neck == vertex)[0]) for vertex in (top, seam[0]))
-            parts = (np.arange((last - first) % len(neck) + 1), -np.arange((first - last) % len(neck) + 1))
-            quarter = np.asarray(neck[(first + min(parts, key=len)) % len(neck)])
-            ends = out[quarter[0]], out[quarter[-1]]
-            if face == "back":
-                out[quarter] = half.beside(vertices[quarter], depth, side, ends)
-            else:
-                share = arc_lengths(vertices[quarter]) / arc_lengths(vertices[quarter])[-1]
-                out[quarter[1:-1]] = half.superellipse(share[1:-1], neckline.front_power, ends)
-    return out
 
 
 def _along_columns(laplacian: Any, points: FloatArray, stiffness: float) -> Any:

@@ -43,7 +43,42 @@ def part_pieces(layout: Layout, vertices: FloatArray, form: Form, seams: Sequenc
     pieces: dict[str, PieceRecipe] = {}
     parts_of: dict[str, dict[str, PieceRecipe]] = {}
     for name, recipe in form.pieces.items():
-        parts_of[name] = _parts(layout, vertices, name, recipe, lines[name]) if name in lines else {name: recipe}
+        if name not in lines:
+            pieces[name] = recipe
+            continue
+        chosen = select_bricks(layout, recipe.bricks)
+        label = _labels(layout, chosen, lines[name])
+        if len(set(label.tolist())) == 1:
+            raise InputError(
+                f"{' and '.join(repr(line) for line in lines[name])} do not part piece {name!r}; name lines that cross it"
+            )
+        groups = [
+            [brick for brick, of in zip(chosen, label, strict=True) if of == part] for part in dict.fromkeys(label)
+        ]
+        # Parts are named by where they lie to each other: centre and side_left, left and right, lower and upper.
+        sides = [
+            next((side for side in ("left", "right") if all(is_side(brick, side) for brick in part)), "")
+            for part in groups
+        ]
+        columns = ["centre" if all(brick.endswith("-centre") for brick in part) else "side" for part in groups]
+        if len(set(columns)) == 1 or not any(sides):
+            columns = [("side" if side else "centre") if "" in sides and any(sides) else "" for side in sides]
+        across = [
+            column
+            if column == "centre" and columns.count("centre") == 1
+            else "_".join(word for word in (column, side) if word)
+            for column, side in zip(columns, sides, strict=True)
+        ]
+        heights = [float(np.mean([vertices[layout.bricks[brick], 1].mean() for brick in part])) for part in groups]
+        endings = []
+        for number, word in enumerate(across):
+            alike = sorted((k for k in range(len(across)) if across[k] == word), key=lambda k: heights[k])
+            at = alike.index(number)
+            place = "" if len(alike) == 1 else ("lower", "upper")[at] if len(alike) == 2 else f"{at + 1}"
+            endings.append("_".join(part for part in (word, place) if part))
+        # Those of the centre come first.
+        ordered = sorted(zip(groups, endings, strict=True), key=lambda each: not each[1].startswith("centre"))
+        parts_of[name] = {f"{name}_{end}": part_recipe(layout, recipe, part, lines[name]) for part, end in ordered}
         pieces |= parts_of[name]
     darts = []
     for dart in form.darts:
@@ -86,47 +121,6 @@ def princess_seams(layout: Layout, bricks: Sequence[str], piece: str) -> list[Fo
         for line in lines
         if len(set(_labels(layout, bricks, [line, other_side(line)]).tolist())) > 1
     ]
-
-
-def _parts(
-    layout: Layout, vertices: FloatArray, name: str, recipe: PieceRecipe, lines: Sequence[str]
-) -> dict[str, PieceRecipe]:
-    """Return the parts of a piece, named by where they lie, those of the centre first.
-
-    Raises:
-        InputError: the lines do not part it.
-    """
-    bricks = select_bricks(layout, recipe.bricks)
-    label = _labels(layout, bricks, lines)
-    if len(set(label.tolist())) == 1:
-        raise InputError(
-            f"{' and '.join(repr(line) for line in lines)} do not part piece {name!r}; name lines that cross it"
-        )
-    groups = [[brick for brick, of in zip(bricks, label, strict=True) if of == part] for part in dict.fromkeys(label)]
-    found: dict[str, PieceRecipe] = {}
-    # Parts are named by where they lie to each other: centre and side_left, left and right, lower and upper.
-    sides = [
-        next((side for side in ("left", "right") if all(is_side(brick, side) for brick in part)), "") for part in groups
-    ]
-    columns = ["centre" if all(brick.endswith("-centre") for brick in part) else "side" for part in groups]
-    if len(set(columns)) == 1 or not any(sides):
-        columns = [("side" if side else "centre") if "" in sides and any(sides) else "" for side in sides]
-    across = [
-        column
-        if column == "centre" and columns.count("centre") == 1
-        else "_".join(word for word in (column, side) if word)
-        for column, side in zip(columns, sides, strict=True)
-    ]
-    heights = [float(np.mean([vertices[layout.bricks[brick], 1].mean() for brick in part])) for part in groups]
-    names = []
-    for number, word in enumerate(across):
-        alike = sorted((k for k in range(len(across)) if across[k] == word), key=lambda k: heights[k])
-        at = alike.index(number)
-        place = "" if len(alike) == 1 else ("lower", "upper")[at] if len(alike) == 2 else f"{at + 1}"
-        names.append("_".join(part for part in (word, place) if part))
-    for part, ending in sorted(zip(groups, names, strict=True), key=lambda each: not each[1].startswith("centre")):
-        found[f"{name}_{ending}"] = part_recipe(layout, recipe, part, lines)
-    return found
 
 
 def part_recipe(layout: Layout, recipe: PieceRecipe, bricks: Sequence[str], lines: Sequence[str]) -> PieceRecipe:

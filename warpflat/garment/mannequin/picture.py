@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,9 +16,7 @@ from warpflat.pattern import (
     INK,
     SIDES,
     SKIN,
-    DrawnView,
     Facets,
-    Pen,
     Scale,
     View,
     draw_row,
@@ -39,6 +37,14 @@ _HEIGHT, _GAP, _NAMES = 8.0, 0.2, 1.8  # of the page, between views, and room fo
 #: Colour of lines on bodies.
 LINE = "#9c1f30"
 _LEADER = (*INK, 0.65)
+# Names of vertical lines are written along them where they are seen best, at a share of their length from below; shoulder and armhole are
+# named beside them: at a share of their length, by a leader that rises by a share of the view's height.
+_ALONG: Mapping[str, Mapping[str, float]] = {
+    "front": {"centre front": 0.06, "crease front right": 0.45, "crease front left": 0.45},
+    "three-quarter": {"outseam left": 0.45},
+    "back": {"centre back": 0.06, "crease back left": 0.45, "crease back right": 0.45},
+}
+_BESIDE = {"three-quarter": (("shoulder left", 0.6, 0.06), ("armhole left", 0.28, 0.075))}
 # A line is not drawn where it turns from the eye: there it slips along the outline.
 _FACING = 0.12
 # Ends of the scale of distances [mm]; what lies farther has the colour of the ends.
@@ -68,8 +74,19 @@ def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) 
             for ids in mannequin.layout.body_lines.values():
                 edges = np.column_stack([ids[:-1], ids[1:]])
                 drawn.draw_segments(edges[towards[edges].all(axis=1)], width=0.9, colour=LINE)
-            if title != "left side":
-                _label_lines(pen, drawn, mannequin, title)
+            for name, share in _ALONG.get(title, {}).items():
+                line = drawn.to_page(drawn.view.points[mannequin.layout.body_lines[name]])
+                line = line if line[0, 1] < line[-1, 1] else line[::-1]
+                at = int(share * (len(line) - 1))
+                (x, y), (rise_x, rise_y) = line[at].tolist(), (line[at + 2] - line[at]).tolist()
+                angle = float(np.degrees(np.arctan2(rise_y, rise_x)))
+                pen.write(x - 0.03, y, name, 8, color=LINE, rotation=angle, rotation_mode="anchor", va="bottom")
+            for name, share, rise in _BESIDE.get(title, ()):
+                ids = mannequin.layout.lines[name]
+                start: FloatArray = drawn.to_page(drawn.view.points[ids[[int(share * (len(ids) - 1))]]])[0]
+                x, y = (start + np.array([0.10, rise]) * (drawn.box[3] - drawn.box[1])).tolist()
+                pen.line(np.array([start, (x - 0.03, y)]), width=0.5, colour=_LEADER)
+                pen.write(x, y, name.removesuffix(" left"), 8)
         # Names and girths [cm] of the profiles stand behind the side view, on short leaders, spread so that none overlap.
         levels, (_, bottom, right, top) = mannequin.levels(), drawn.box
         names = ["neck", "chest back", *reversed(TRUNK_RINGS), *(f"{line} left" for line in LEG_LINES.values())]
@@ -81,35 +98,6 @@ def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) 
             pen.line(np.array([(end[0] + 0.03, end[1]), (right + 0.44, y)]), width=0.5, colour=_LEADER)
             pen.write(right + 0.5, y, f"{shown} {levels[name].girth * 100:.1f} cm", 8)
         pen.write(0.5 * pen.width, 0.98 * _HEIGHT, f"Mannequin: {mannequin.source}", 12, ha="center")
-
-
-def _label_lines(pen: Pen, drawn: DrawnView, mannequin: Mannequin, view: str) -> None:
-    """Write names of the vertical lines along them where they are seen best, and of shoulder and armhole."""
-    places = {
-        "front": {"centre front": 0.06, "crease front right": 0.45, "crease front left": 0.45},
-        "three-quarter": {"outseam left": 0.45},
-        "back": {"centre back": 0.06, "crease back left": 0.45, "crease back right": 0.45},
-    }[view]
-    for name, share in places.items():
-        line = drawn.to_page(drawn.view.points[mannequin.layout.body_lines[name]])
-        line = line if line[0, 1] < line[-1, 1] else line[::-1]
-        row = int(share * (len(line) - 1))
-        (x, y), (rise_x, rise_y) = line[row].tolist(), (line[row + 2] - line[row]).tolist()
-        along: dict[str, Any] = {
-            "rotation": float(np.degrees(np.arctan2(rise_y, rise_x))),
-            "rotation_mode": "anchor",
-            "va": "bottom",
-        }
-        pen.write(x - 0.03, y, name, 8, color=LINE, **along)
-    if view != "three-quarter":
-        return
-    height = drawn.box[3] - drawn.box[1]
-    for name, share, rise in (("shoulder left", 0.6, 0.06), ("armhole left", 0.28, 0.075)):
-        ids = mannequin.layout.lines[name]
-        start: FloatArray = drawn.to_page(drawn.view.points[ids[[int(share * (len(ids) - 1))]]])[0]
-        x, y = (start + np.array([0.10, rise]) * height).tolist()
-        pen.line(np.array([start, (x - 0.03, y)]), width=0.5, colour=_LEADER)
-        pen.write(x, y, name.removesuffix(" left"), 8)
 
 
 def signed_distances(mannequin: Mannequin) -> FloatArray:

@@ -111,7 +111,13 @@ def cut_pieces(
         for line in (*opened, *([datum] if datum else [])):
             if line not in layout.lines:
                 raise InputError(f"form: piece {name}: line {line!r} is unknown: {nearest(line, layout.lines)}")
-        _check_opened(layout, name, bricks, opened)
+        inside = layout.edges_of(bricks, inside=True) if opened else set()
+        for line in opened:
+            if inside.isdisjoint(layout.edges_along(line)):
+                through = [each for each in layout.lines if not inside.isdisjoint(layout.edges_along(each))]
+                raise InputError(
+                    f"form: line {line!r} does not run through piece {name}, which is to be open along it: {nearest(line, through)}"
+                )
         cuts[name] = (bricks, datum, opened)
     if half:
         check_halves(cuts)
@@ -122,19 +128,6 @@ def cut_pieces(
         or _piece(layout, vertices, name, *cut, darts.get(name, {}), half, {**_CONTINUED, **continued})
         for name, cut in cuts.items()
     }
-
-
-def _check_opened(layout: Layout, name: str, bricks: Sequence[str], opened: Sequence[str]) -> None:
-    """See that a piece lies on both sides of the lines along which it is to be open."""
-    if not opened:
-        return
-    inside = layout.edges_of(bricks, inside=True)
-    through = [line for line in layout.lines if not inside.isdisjoint(layout.edges_along(line))]
-    for line in opened:
-        if line not in through:
-            raise InputError(
-                f"form: line {line!r} does not run through piece {name}, which is to be open along it: {nearest(line, through)}"
-            )
 
 
 def _piece(
@@ -155,8 +148,25 @@ def _piece(
     inside = set(np.unique(layout.faces[rows]).tolist())
     darts = {dart: row for dart, row in darts.items() if inside.issuperset(row.tolist())}
     slits = {(min(a, b), max(a, b)) for row in darts.values() for a, b in itertools.pairwise(row.tolist())}
-    corners, grid_vertices = _split(layout.faces[rows], layout.edges_along(*opened) | slits)
-    loop, holes = _borders(corners, name, opened=bool(opened), darts=darts)
+    # Vertices are doubled along cuts: two corners at one vertex are one vertex of the piece if a chain of faces joins them without crossing
+    # a cut.
+    cut = layout.edges_along(*opened) | slits
+    he = half_edges(layout.faces[rows])
+    a, b = paired_half_edges(he)
+    whole = np.array([(low, high) not in cut for low, high in he.edges.tolist()])[he.edge[a]]
+    fan = fan_labels(he, a[whole], b[whole])
+    vertex = he.tail[np.unique(fan, return_index=True)[1]]
+    # Numbered in the mannequin's order, so that a piece is the same in every size.
+    order = np.argsort(vertex, kind="stable")
+    number = np.empty(len(order), np.int32)
+    number[order] = np.arange(len(order))
+    corners, grid_vertices = number[fan].reshape(-1, 4), vertex[order]
+    sides = half_edges(corners)
+    loops = border_loops(sides)
+    # By Euler: every further loop is a hole of the one disk.
+    if not loops or euler_characteristic(sides) != 2 - len(loops):
+        raise InputError(_not_one_disk(name, opened=bool(opened), darts=darts))
+    loop, *holes = loops
     # A fish-eye dart is a hole; its legs run from its first tip to its second.
     fisheyes = {}
     for hole in holes:
@@ -192,37 +202,6 @@ def _piece(
         face_brick=tuple(names[i] for i in layout.face_brick[rows]), parts=parts,
         darts={dart: _legs(dart) for dart in darts}, fisheyes=fisheyes,
     )  # fmt: skip
-
-
-def _split(faces: IntArray, cut: set[tuple[int, int]]) -> tuple[IntArray, IntArray]:
-    """Return faces renumbered to the piece's own vertices, which are doubled along the edges in `cut`.
-
-    Two corners at one vertex are one vertex of the piece if a chain of faces joins them without crossing the cut.
-    """
-    he = half_edges(faces)
-    a, b = paired_half_edges(he)
-    whole = np.array([(low, high) not in cut for low, high in he.edges.tolist()])[he.edge[a]]
-    fan = fan_labels(he, a[whole], b[whole])
-    vertex = he.tail[np.unique(fan, return_index=True)[1]]
-    # Numbered in the mannequin's order, so that a piece is the same in every size.
-    order = np.argsort(vertex, kind="stable")
-    number = np.empty(len(order), np.int32)
-    number[order] = np.arange(len(order))
-    return number[fan].reshape(-1, 4), vertex[order]
-
-
-def _borders(corners: IntArray, name: str, *, opened: bool, darts: Collection[str]) -> tuple[IntArray, list[IntArray]]:
-    """Return the border loop of a disk, counter-clockwise from outside, and those of its holes, clockwise.
-
-    Raises:
-        InputError: the faces are no disk, with or without holes.
-    """
-    sides = half_edges(corners)
-    loops = border_loops(sides)
-    # By Euler: every further loop is a hole of the one disk.
-    if not loops or euler_characteristic(sides) != 2 - len(loops):
-        raise InputError(_not_one_disk(name, opened=opened, darts=darts))
-    return loops[0], loops[1:]
 
 
 def _not_one_disk(name: str, *, opened: bool, darts: Collection[str]) -> str:
@@ -301,8 +280,14 @@ def _lines(
 
     Where an edge goes on inside as the same line, its name means both.
     """
-    lines = dict(edges)
-    for line, runs in _inner_runs(layout, corners, grid_vertices).items():
+    lines, sides = dict(edges), half_edges(corners)
+    # Off the border, and so off all that is doubled, an edge of the mannequin is one of the piece.
+    inner: dict[tuple[int, int], int] = {}
+    for u, v in sides.edges[sides.count == 2].tolist():
+        a, b = int(grid_vertices[u]), int(grid_vertices[v])
+        inner[a, b], inner[b, a] = v, u
+    for line, ids in layout.lines.items():
+        runs = joined_runs((inner[b, a], inner[a, b]) for a, b in itertools.pairwise(ids.tolist()) if (a, b) in inner)
         along = [edge for edge in edges if is_part_of(edge, line)]
         for run in sorted(runs, key=len, reverse=True):
             whole, border = _with_edges(run, {edge: lines[edge].tolist() for edge in along})
@@ -330,19 +315,3 @@ def _with_edges(run: list[int], edges: Mapping[str, list[int]]) -> tuple[list[in
             continue
         joined.add(name)
     return run, next((name for name in edges if name in joined), None)
-
-
-def _inner_runs(layout: Layout, corners: IntArray, grid_vertices: IntArray) -> dict[str, list[list[int]]]:
-    """Return the runs of each feature line inside the piece, off the border, as vertex indices of the piece."""
-    sides = half_edges(corners)
-    # Off the border, and so off all that is doubled, an edge of the mannequin is one of the piece.
-    inner: dict[tuple[int, int], int] = {}
-    for u, v in sides.edges[sides.count == 2].tolist():
-        a, b = int(grid_vertices[u]), int(grid_vertices[v])
-        inner[a, b], inner[b, a] = v, u
-    found: dict[str, list[list[int]]] = {}
-    for line, ids in layout.lines.items():
-        edges = itertools.pairwise(ids.tolist())
-        if runs := joined_runs((inner[b, a], inner[a, b]) for a, b in edges if (a, b) in inner):
-            found[line] = runs
-    return found

@@ -136,13 +136,27 @@ def _trunk_levels(body: BodySections, noise: float, given: Mapping[str, float]) 
     found = {"armpit": ScanLevel(height=min(float(place[1]) for place in body.armpits.values()))}
     armpit = given.get("armpit", found["armpit"].height)
     found["hip"] = _least(body, "hip", t.y, t.back, noise, "the seat does not stand out")
-    found["underbust"] = _underbust(body, noise, armpit)
+    # Below a full bust the outline over the bust points bends forward in a fold.
+    bust, under = height_of("bust", body.vertices), min(height_of("underbust", body.vertices), armpit - 0.02 * size)
+    apart = _BUST_POINT * float(np.interp(bust, t.y, t.girth)) / size
+    outline = smooth(np.array([np.interp(apart, OUTLINES, row) for row in t.outlines]), 2.0)
+    bend = np.gradient(np.gradient(outline, t.y), t.y) * size
+    ribs = np.flatnonzero((t.y > under - _FOLD_BELOW * size) & (t.y < under))
+    leap = np.diff(t.girth[ribs]) / t.girth[ribs[:-1]]
+    # The first fold from just above the landmark down: the next one lies between belly and waist.
+    near = np.flatnonzero((t.y > under - _FOLD_BELOW * size) & (t.y < under + _FOLD_ABOVE * size))
+    folds = near[(bend[near] > _FOLD) & (bend[near] >= bend[near - 1]) & (bend[near] > bend[near + 1])]
+    is_sure = leap.max() > _LEAP or (len(folds) and bend[folds[-1]] > _SURE_FOLD)
+    if leap.max() > _LEAP:
+        under = float(t.y[ribs[np.argmax(leap)]])
+    elif len(folds):
+        under = _halfway(body, under, summit(t.y, bend, int(folds[-1])))
+    found["underbust"] = ScanLevel(height=under, guess=unsure_of(noise) if is_sure else _NO_FOLD)
     # Over a belly, or under a bust that hangs, the narrowest place may be the underbust itself.
     below = given.get("underbust", found["underbust"].height) - _BELOW_UNDERBUST * size
     lacking = "the trunk has no narrowest section below the underbust"
     found["waist"] = _least(body, "waist", t.y, smooth(t.girth, sigma), noise, lacking, below=below)
     # Bust points are the bust's most prominent places.
-    bust = height_of("bust", body.vertices)
     points = np.linspace(*BUST_POINTS, 9) * float(np.interp(bust, t.y, t.girth)) / size
     ahead = smooth(np.array([np.interp(points, OUTLINES, row).max() for row in t.outlines]), sigma)
     shown = _least(body, "bust", t.y, -ahead, noise, "no bust stands out", below=armpit - _BELOW_ARMPIT * size)
@@ -156,48 +170,18 @@ def _trunk_levels(body: BodySections, noise: float, given: Mapping[str, float]) 
     between = (t.y > hip + 0.38 * (waist - hip)) & (t.y < hip + 0.62 * (waist - hip))
     belly = float(t.y[between][np.argmax(smooth(t.front, 3)[between])]) if between.any() else 0.5 * (waist + hip)
     found["abdomen"] = ScanLevel(height=belly)
-    low = height_of("front_neck", body.vertices)
-    beside = float(np.clip(_side_neck(body, armpit), low + 0.008 * size, low + 0.035 * size))
-    found["front_neck"], found["side_neck"] = ScanLevel(height=low), ScanLevel(height=beside)
-    return found
-
-
-def _underbust(body: BodySections, noise: float, armpit: float) -> ScanLevel:
-    """Return the level under the bust: below a full one the outline over the bust points bends forward in a fold.
-
-    Args:
-        body: the sections.
-        noise: of the scan [m].
-        armpit: height [m].
-    """
-    t, size = body.trunk, body.stature
-    at = min(height_of("underbust", body.vertices), armpit - 0.02 * size)
-    apart = _BUST_POINT * float(np.interp(height_of("bust", body.vertices), t.y, t.girth)) / size
-    outline = smooth(np.array([np.interp(apart, OUTLINES, row) for row in t.outlines]), 2.0)
-    bend = np.gradient(np.gradient(outline, t.y), t.y) * size
-    below = np.flatnonzero((t.y > at - _FOLD_BELOW * size) & (t.y < at))
-    leap = np.diff(t.girth[below]) / t.girth[below[:-1]]
-    # The first fold from just above the landmark down: the next one lies between belly and waist.
-    near = np.flatnonzero((t.y > at - _FOLD_BELOW * size) & (t.y < at + _FOLD_ABOVE * size))
-    folds = near[(bend[near] > _FOLD) & (bend[near] >= bend[near - 1]) & (bend[near] > bend[near + 1])]
-    is_sure = leap.max() > _LEAP or (len(folds) and bend[folds[-1]] > _SURE_FOLD)
-    if leap.max() > _LEAP:
-        at = float(t.y[below[np.argmax(leap)]])
-    elif len(folds):
-        at = _halfway(body, at, summit(t.y, bend, int(folds[-1])))
-    return ScanLevel(height=at, guess=unsure_of(noise) if is_sure else _NO_FOLD)
-
-
-def _side_neck(body: BodySections, armpit: float) -> float:
-    """Return the height [m] at which the outline turns from the shoulder into the neck: furthest inside the line between the two."""
-    t, size, at = body.trunk, body.stature, height_of("side_neck", body.vertices)
+    # The outline turns from the shoulder into the neck where it lies furthest inside the line between the two.
+    low, beside = (height_of(name, body.vertices) for name in ("front_neck", "side_neck"))
     upper = np.flatnonzero((t.y > 0.80 * size) & (t.y < 0.91 * size))
     narrow = float(t.y[upper[np.argmin(t.girth[upper])]])
     y = t.y[(t.y >= armpit + 0.55 * (narrow - armpit)) & (t.y <= narrow)]
     half = smooth(np.array([0.5 * float(np.ptp(body.scan.points(UP, float(each))[:, 0])) for each in y]), 1.0)
     inside = np.interp(y, [y[0], y[-1]], [half[0], half[-1]]) - half
-    row = int(np.argmax(np.where(np.abs(y - at) < _NECK * size, inside, -np.inf)))
-    return summit(y, inside, row) if 0 < row < len(y) - 1 else at
+    row = int(np.argmax(np.where(np.abs(y - beside) < _NECK * size, inside, -np.inf)))
+    beside = summit(y, inside, row) if 0 < row < len(y) - 1 else beside
+    beside = float(np.clip(beside, low + 0.008 * size, low + 0.035 * size))
+    found["front_neck"], found["side_neck"] = ScanLevel(height=low), ScanLevel(height=beside)
+    return found
 
 
 def _leg_level(body: BodySections, name: str, side: str, noise: float) -> ScanLevel:

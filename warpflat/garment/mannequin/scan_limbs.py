@@ -12,7 +12,7 @@ from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.mannequin.layout import LEG_LEVELS, QUARTERS
 from warpflat.garment.mannequin.rays import ray_radii, smooth_radii, with_harmonics
 from warpflat.garment.mannequin.sampled import row_at, smooth
-from warpflat.garment.mannequin.scan_sections import ArmSections, BodySections
+from warpflat.garment.mannequin.scan_sections import BodySections
 from warpflat.garment.mannequin.slicer import UP, Slicer
 from warpflat.garment.mannequin.table_legs import AROUND_LEG, crotch_curve, profile_of_curve
 
@@ -72,19 +72,51 @@ def upper_curves(
         # The loop runs from the underarm forward: its first half is the front.
         halves = {"front": hole[tip::-1], "back": np.vstack([hole[tip:], hole[:1]])}
         seam = _shoulder(slicer, around[corner], hole[tip])
-        for face, line in (("front", around[: corner + 1]), ("back", around[corner : end + 1][::-1])):
+        for face, ahead, line in (("front", 1.0, around[: corner + 1]), ("back", -1.0, around[corner : end + 1][::-1])):
             curve = halves[face]
             rise = (curve[:, 1] - curve[-1, 1]) / max(curve[0, 1] - curve[-1, 1], 1e-9)
             s = arc_lengths(curve)
             notch = int(np.argmin(np.abs(rise - NOTCH)))
-            row = _row(slicer, curve[notch], face)
+            # The across-chest row runs from the midplane to the armhole's notch.
+            end_x, height, end_z = curve[notch]
+            points, aside = slicer.points(UP, float(height)), np.sign(end_x)
+            x = np.linspace(0.0, abs(end_x), 30)
+            z = np.array([
+                ahead * _outermost(ahead * points[:, 2], aside * points[:, 0] - at, x[1], ahead * end_z) for at in x
+            ])  # fmt: skip
+            fit = np.polynomial.Polynomial.fit(x / x[-1], z - end_z, 5)(x / x[-1])
+            z = end_z + fit - fit[-1] * (x / x[-1]) ** 3
+            row = np.column_stack([aside * x, np.full_like(x, height), z])
+            # The centre line runs from the bust to the neckline.
+            low, top = levels["bust"], line[0]
+            y = np.linspace(low, top[1], 24)
+            points = slicer.points(np.array([1.0, 0.0, 0.0]), 1e-4)
             first = bust.curve[0 if face == "front" else len(bust.curve) // 2]
-            bottom = np.array([0.0, levels["bust"], first[1]])
+            z = np.interp(y, [low, row[0, 1], top[1]], [first[1], row[0, 2], top[2]])
+            for i in range(2, len(y) - 1):
+                near = points[np.abs(points[:, 2] - z[i]) < 0.05]
+                z[i] = ahead * _outermost(ahead * near[:, 2], near[:, 1] - y[i], 0.006, ahead * z[i])
+            z[1:-1] = np.convolve(z, [0.25, 0.5, 0.25], mode="same")[1:-1]
             quarters[f"{face}-{side}"] = QuarterCurves(
                 neckline=line, shoulder=seam, armhole=curve, notch=float(s[notch] / s[-1]), chest=row,
-                centre=_centre(slicer, bottom, row[0], line[0], face),
+                centre=np.column_stack([np.zeros_like(y), y, z]),
             )  # fmt: skip
-    arms = {side: _arm_curves(arm, holes[side]) for side, arm in body.arms.items()}
+    # Of an arm from biceps to wrist; its curves turn with the arm and are not wrung against the armhole.
+    arms: dict[str, dict[float, FloatArray]] = {}
+    for side, arm in body.arms.items():
+        hole = holes[side]
+        under, top = hole[0], hole[int(np.argmax(hole[:, 1]))]
+        axis = unit(arm.line[-1] - hole.mean(axis=0))
+        beyond = max(float(point @ axis) for point in (under, top)) + _SHORTEST_SLEEVE
+        biceps = float(np.clip(np.interp(beyond, arm.line @ axis, arm.s), arm.s[4], arm.elbow - 0.10 * arm.s[-1]))
+        along = np.interp(_ARM_PLACES, [0.0, 1.0, 2.0], [biceps, arm.elbow, arm.wrist])
+        # From the armhole's lowest to its highest point, carried along the arm without a twist.
+        up, outwards, arms[side] = top - under, np.sign(under[0]), {}
+        for place, at in zip(_ARM_PLACES, along, strict=True):
+            middle, across = arm.frame(float(at))
+            up = unit(up - across * float(across @ up))
+            cut = arm.cut(middle, across)
+            arms[side][place] = _loop(cut, cut.mean(axis=0), -up, outwards * np.cross(across, up), 4, 240)
     neck = polyline_length(neckline, closed=True)
     return {name: quarters[name] for name in QUARTERS}, arms, collar, neck
 
@@ -274,50 +306,6 @@ def _shoulder(slicer: Slicer, neck: FloatArray, tip: FloatArray) -> FloatArray:
     return straight
 
 
-def _row(slicer: Slicer, notch: FloatArray, face: str) -> FloatArray:
-    """Return the across-chest row on the scan, from the midplane to the armhole's notch."""
-    sign = 1.0 if face == "front" else -1.0
-    points = slicer.points(UP, float(notch[1]))
-    side = np.sign(notch[0])
-    x = np.linspace(0.0, abs(notch[0]), 30)
-    z = np.array([sign * _outermost(sign * points[:, 2], side * points[:, 0] - at, x[1], sign * notch[2]) for at in x])
-    fit = np.polynomial.Polynomial.fit(x / x[-1], z - notch[2], 5)(x / x[-1])
-    z = notch[2] + fit - fit[-1] * (x / x[-1]) ** 3
-    return np.column_stack([side * x, np.full_like(x, notch[1]), z])
-
-
-def _centre(slicer: Slicer, bottom: FloatArray, chest: FloatArray, top: FloatArray, face: str) -> FloatArray:
-    """Return the centre line from the bust to the neckline on the scan."""
-    sign = 1.0 if face == "front" else -1.0
-    y = np.linspace(bottom[1], top[1], 24)
-    points = slicer.points(np.array([1.0, 0.0, 0.0]), 1e-4)
-    z = np.interp(y, [bottom[1], chest[1], top[1]], [bottom[2], chest[2], top[2]])
-    for i in range(2, len(y) - 1):
-        near = points[np.abs(points[:, 2] - z[i]) < 0.05]
-        z[i] = sign * _outermost(sign * near[:, 2], near[:, 1] - y[i], 0.006, sign * z[i])
-    z[1:-1] = np.convolve(z, [0.25, 0.5, 0.25], mode="same")[1:-1]
-    return np.column_stack([np.zeros_like(y), y, z])
-
-
-def _arm_curves(arm: ArmSections, hole: FloatArray) -> dict[float, FloatArray]:
-    """Return the curves from biceps to wrist by their place; they turn with the arm and are not wrung against the armhole `hole`."""
-    top = hole[int(np.argmax(hole[:, 1]))]
-    axis = unit(arm.line[-1] - hole.mean(axis=0))
-    beyond = max(float(point @ axis) for point in (hole[0], top)) + _SHORTEST_SLEEVE
-    biceps = float(np.clip(np.interp(beyond, arm.line @ axis, arm.s), arm.s[4], arm.elbow - 0.10 * arm.s[-1]))
-    along = np.interp(_ARM_PLACES, [0.0, 1.0, 2.0], [biceps, arm.elbow, arm.wrist])
-    # From the armhole's lowest to its highest point, carried along the arm without a twist.
-    up = top - hole[0]
-    side = np.sign(hole[0, 0])
-    rings: dict[float, FloatArray] = {}
-    for place, s in zip(_ARM_PLACES, along, strict=True):
-        at, across = arm.frame(float(s))
-        up = unit(up - across * float(across @ up))
-        cut = arm.cut(at, across)
-        rings[place] = _loop(cut, cut.mean(axis=0), -up, side * np.cross(across, up), 4, 240)
-    return rings
-
-
 def leg_curves(body: BodySections, levels: Mapping[str, float], hip: Profile) -> LegCurves:
     """Return crotch curve and legs for the grid.
 
@@ -327,9 +315,20 @@ def leg_curves(body: BodySections, levels: Mapping[str, float], hip: Profile) ->
         hip: the trunk's profile at the hip.
     """
     from scipy.ndimage import gaussian_filter1d
+    from scipy.spatial import ConvexHull
 
     legs = body.legs
-    crotch = _crotch(body, levels["hip"], hip)
+    # The crotch curve runs through air at the back, where cloth bridges the cleft, and nowhere inside the body.
+    height, front, back = levels["hip"], float(hip.curve[0, 1]), float(hip.curve[len(hip.curve) // 2, 1])
+    cut = body.slicer.points(np.array([1.0, 0.0, 0.0]), 1e-5)
+    near = (cut[:, 1] < height) & (cut[:, 1] > body.lowest - 1e-6) & (cut[:, 2] < front) & (cut[:, 2] > back)
+    flat = np.concatenate([crotch_curve(height, body.lowest, front, back)[:, [2, 1]], cut[near][:, [2, 1]]])
+    hull = flat[ConvexHull(flat).vertices]
+    order = np.argsort(np.arctan2(hull[:, 1] - height - 1e-4, hull[:, 0] - 0.5 * (front + back)))
+    hull = hull[order][::-1]
+    hull = np.roll(hull, -int(np.argmax(hull[:, 0])), axis=0)
+    line = resample(hull, np.linspace(0.0, 1.0, 200))
+    crotch = np.column_stack([np.zeros(len(line)), line[:, 1], line[:, 0]])
     point = float(resample(crotch, _POINT)[2])
     thigh, knee = levels["leg_thigh"], levels["leg_knee"]
     curves: dict[str, FloatArray] = {}
@@ -365,52 +364,19 @@ def leg_curves(body: BodySections, levels: Mapping[str, float], hip: Profile) ->
         girth, outseam = (float(row_at(rows[side], legs.y, height)) for rows in (legs.girths, outseams))
         return profile_of_curve(curve, girth, near, outseam)
 
-    heights = {level: levels[level] for level in LEG_LEVELS[1:]}
-    return LegCurves(
-        heights=heights, profile=profile, crotch=crotch, point=_POINT,
-        attract=_seat_attractor(body, thigh, levels["hip"], 0.5 * float(np.ptp(hip.curve[:, 0]))),
-    )  # fmt: skip
-
-
-def _seat_attractor(body: BodySections, low: float, high: float, half: float) -> Callable[[FloatArray], FloatArray]:
-    """Return the nearest place on seat and thighs for every point inside the body; points outside stay where they are.
-
-    Cloth bridges cleft and crotch, so nothing is drawn inwards.
-
-    Args:
-        body: its sections.
-        low, high: heights between which it is asked [m].
-        half: of the width at the hip [m]: what lies farther out than hip and thighs is a hand.
-    """
-    points, triangles, legs = body.vertices, body.slicer.triangles, body.legs
+    points, triangles, room = body.vertices, body.slicer.triangles, 0.06
     middle = points[triangles].mean(axis=1)
-    room = 0.06
-    # The thighs may be broader than the hip.
-    thighs = [hull for hulls in legs.hulls.values() for hull, y in zip(hulls, legs.y, strict=True) if y > low - room]
-    half = max(half, *(float(np.abs(hull[:, 0]).max()) for hull in thighs))
-    near = (middle[:, 1] > low - room) & (middle[:, 1] < high + room) & (np.abs(middle[:, 0]) < half + 0.01)
-    surface = Mesh(points, triangles[near])
+    # What lies farther out than hip and thighs is a hand. The thighs may be broader than the hip.
+    thighs = [hull for rows in legs.hulls.values() for hull, y in zip(rows, legs.y, strict=True) if y > thigh - room]
+    half = max(0.5 * float(np.ptp(hip.curve[:, 0])), *(float(np.abs(hull[:, 0]).max()) for hull in thighs))
+    of_seat = (middle[:, 1] > thigh - room) & (middle[:, 1] < height + room) & (np.abs(middle[:, 0]) < half + 0.01)
+    surface = Mesh(points, triangles[of_seat])
 
     def attract(where: FloatArray) -> FloatArray:
+        # Cloth bridges cleft and crotch, so nothing is drawn inwards: points outside seat and thighs stay where they are.
         triangle, weights, place = surface.closest(where)
         inside = np.einsum("nd,nd->n", place - where, surface.normals_at(triangle, weights)) > 0.0
         return np.where(inside[:, None], place, where)
 
-    return attract
-
-
-def _crotch(body: BodySections, hip: float, profile: Profile) -> FloatArray:
-    """Return the crotch curve: through air at the back, where cloth bridges the cleft, and nowhere inside the body."""
-    from scipy.spatial import ConvexHull
-
-    front, back = float(profile.curve[0, 1]), float(profile.curve[len(profile.curve) // 2, 1])
-    curve = crotch_curve(hip, body.lowest, front, back)
-    cut = body.slicer.points(np.array([1.0, 0.0, 0.0]), 1e-5)
-    inside = (cut[:, 1] < hip) & (cut[:, 1] > body.lowest - 1e-6) & (cut[:, 2] < front) & (cut[:, 2] > back)
-    flat = np.concatenate([curve[:, [2, 1]], cut[inside][:, [2, 1]]])
-    hull = flat[ConvexHull(flat).vertices]
-    order = np.argsort(np.arctan2(hull[:, 1] - hip - 1e-4, hull[:, 0] - 0.5 * (front + back)))
-    hull = hull[order][::-1]
-    hull = np.roll(hull, -int(np.argmax(hull[:, 0])), axis=0)
-    line = resample(hull, np.linspace(0.0, 1.0, 200))
-    return np.column_stack([np.zeros(len(line)), line[:, 1], line[:, 0]])
+    heights = {level: levels[level] for level in LEG_LEVELS[1:]}
+    return LegCurves(heights=heights, profile=profile, crotch=crotch, point=_POINT, attract=attract)

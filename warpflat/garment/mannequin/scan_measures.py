@@ -220,12 +220,14 @@ def _head(slicer: Slicer, stature: float) -> ScanMeasure | None:
     )
 
 
-def _fold_of_arm(body: BodySections, side: str) -> FloatArray:
-    """Return the place [m] on the trunk's skin at which an arm joins it: below the first level section whose trunk leaps into the arm.
+def _biceps(body: BodySections, side: str, noise: float) -> ScanMeasure:
+    """Return the fullest tape across the upper arm's bone, from beyond the armpit to the elbow.
 
-    Where none does near the body's vertex, as under a web, that vertex.
+    The muscle's belly counts before the shoulder's flesh at the upper end, which a lowered arm presses out.
     """
-    armpit, size = body.armpits[side], body.stature
+    arm, armpit, size = body.arms[side], body.armpits[side], body.stature
+    # An arm joins the trunk below the first level section whose trunk leaps into the arm. Where none does near the body's vertex, as under
+    # a web, it is that vertex.
     sign = float(np.sign(armpit[0]))
     before: FloatArray | None = None
     for y in np.arange(armpit[1] - _FOLD_OF_ARM * size, armpit[1] + _FOLD_OF_ARM * size, 0.001):
@@ -236,24 +238,16 @@ def _fold_of_arm(body: BodySections, side: str) -> FloatArray:
         widest = max(trunk, key=lambda p: float(np.ptp(p[:, 0])))
         edge = widest[np.argmax(sign * widest[:, 0])]
         if before is not None and sign * (edge - before)[0] > _LEAP_OF_ARM * size:
-            return before
+            armpit = before
+            break
         before = edge
-    return armpit
-
-
-def _biceps(body: BodySections, side: str, noise: float) -> ScanMeasure:
-    """Return the fullest tape across the upper arm's bone, from beyond the armpit to the elbow.
-
-    The muscle's belly counts before the shoulder's flesh at the upper end, which a lowered arm presses out.
-    """
-    arm, armpit = body.arms[side], _fold_of_arm(body, side)
-    rows = (arm.s > 0.35 * arm.elbow) & (arm.s < arm.elbow - 0.02 * body.stature)
+    rows = (arm.s > 0.35 * arm.elbow) & (arm.s < arm.elbow - 0.02 * size)
     way = unit(arm.way[rows].mean(axis=0))
     middle = arm.line[rows].mean(axis=0)
     end = float((arm.frame(arm.elbow)[0] - middle) @ way) - 0.02
     tapes = [
         tape_around(arm.cut(middle + at * way, way), way)
-        for at in np.arange(float((armpit - middle) @ way) + _BEYOND_ARMPIT * body.stature, end, 0.002)
+        for at in np.arange(float((armpit - middle) @ way) + _BEYOND_ARMPIT * size, end, 0.002)
     ]
     if len(tapes) < 3:
         raise InputError(f"scan: no upper arm between the armpit at {armpit[1]:.2f} m and the elbow; give landmarks")

@@ -90,7 +90,7 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
         InputError: if the mesh is no body that stands on two legs, or its facing cannot be found.
     """
     options.check()
-    welded, scanned, loose = _without_loose_pieces(*_welded(vertices, faces))
+    welded, scanned, loose = _welded(vertices, faces)
     if not len(scanned):
         raise InputError(
             "scan: no face is left where vertices that lie at one place are joined; its places need more digits, or it lies too far from "
@@ -167,7 +167,14 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
     return upright, notes
 
 
-def _welded(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray, NDArray[np.int64]]:
+def _welded(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray, NDArray[np.int64], int]:
+    """Return the triangles of a mesh without its small pieces, as floor plates and slivers, their vertices, and how many these were.
+
+    Vertices that lie at one place are joined. A scan that is torn into small pieces keeps them.
+
+    Raises:
+        InputError: the mesh is broken, or no scan.
+    """
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] not in (3, 4):
         raise InputError(
             f"scan: vertices {vertices.shape} and faces {faces.shape}; #V by 3 and #F by 3 or 4 are needed"
@@ -197,23 +204,14 @@ def _welded(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray,
     )
     triangles = triangles[solid]
     kept, local = np.unique(triangles, return_inverse=True)
-    return vertices[used[first[kept]]].astype(float), np.ravel(local).reshape(-1, 3).astype(np.int64)
-
-
-def _without_loose_pieces(
-    points: FloatArray, triangles: NDArray[np.int64]
-) -> tuple[FloatArray, NDArray[np.int64], int]:
-    """Return a mesh without its small pieces, as floor plates and slivers, and how many these were.
-
-    A scan that is torn into small pieces keeps them.
-    """
+    points, triangles = vertices[used[first[kept]]].astype(float), np.ravel(local).reshape(-1, 3).astype(np.int64)
     label = join_labels(len(points), triangles[:, :2].ravel(), triangles[:, 1:].ravel())[triangles[:, 0]]
     _, piece, count = np.unique(label, return_inverse=True, return_counts=True)
     small = count < _LOOSE * len(triangles)
     if not small.any() or count[small].sum() > _LOOSE_TOGETHER * len(triangles):
         return points, triangles, 0
-    used, kept = np.unique(triangles[~small[piece.ravel()]], return_inverse=True)
-    return points[used], kept.reshape(-1, 3), int(small.sum())
+    kept, local = np.unique(triangles[~small[piece.ravel()]], return_inverse=True)
+    return points[kept], local.reshape(-1, 3), int(small.sum())
 
 
 # --- which way it stands and looks, found from legs, trunk and feet
@@ -261,23 +259,24 @@ def find_legs(slicer: Slicer, up: FloatArray, *, sits: bool = False) -> tuple[fl
         if not _BEFORE[0] * (high - low) < away < _BEFORE[1] * (high - low):
             return 0.0, None
         sideways = np.cross(up, ahead @ across)
-    return score if _is_body(middle, trunk, parts(0.93), high - low) else 0.0, sideways
+    head, reach = parts(0.93), 0.12 * (high - low)
+    # One trunk stands over the legs' middle and one head over the trunk; a child's head may be the broader. A bowed head lets chin and nose
+    # fall into parts of their own.
+    stands = (
+        len(trunk) > 0
+        and np.linalg.norm(trunk[0][1] - middle) < reach
+        and len(head) > 0
+        and not _is_pair(head)
+        and np.linalg.norm(head[0][1] - middle) < 1.5 * reach
+        and head[0][0] < 1.5 * trunk[0][0]
+        and trunk[0][0] < (0.42 * (high - low)) ** 2
+    )
+    return score if stands else 0.0, sideways
 
 
 def _is_pair(legs: list[_Part]) -> bool:
     """Return whether parts of a section are two of similar size, as those of two legs are."""
     return len(legs) == 2 and legs[0][0] < 2.0 * legs[1][0]
-
-
-def _is_body(middle: FloatArray, trunk: list[_Part], head: list[_Part], height: float) -> bool:
-    """Return whether one trunk stands over the legs' middle and one head over the trunk; a child's head may be the broader."""
-    reach = 0.12 * height
-    if not trunk or np.linalg.norm(trunk[0][1] - middle) >= reach:
-        return False
-    # A bowed head lets chin and nose fall into parts of their own.
-    if not head or _is_pair(head) or np.linalg.norm(head[0][1] - middle) >= 1.5 * reach:
-        return False
-    return head[0][0] < 1.5 * trunk[0][0] and trunk[0][0] < (0.42 * height) ** 2
 
 
 def across_trunk(slicer: Slicer, up: FloatArray, sideways: FloatArray) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -155,10 +155,24 @@ class BodySections:
         #: By side, trunk, leg and head without the arm.
         self.halves = {side: shown(part) for side, part in places.halves.items()}
         self.trunk, self.legs = self._level_sections()
-        self.arms = {
-            side: self._arm(side, Slicer(vertices, triangles[part]), shown(part & ~places.halves[side]))
-            for side, part in places.arms.items()
-        }
+        self.arms = dict[str, ArmSections]()
+        at_model = np.linspace(*_ARM, _ARM_COUNT)
+        for side, part in places.arms.items():
+            # An arm is sliced across the line through the middles of its vertices, and then of its sections.
+            line = np.array([value_at(near_place(float(at), side), vertices) for at in at_model])
+            arm = ArmSections(
+                slicer=Slicer(vertices, triangles[part]), scan=shown(part & ~places.halves[side]),
+                s=arc_lengths(line), line=line, way=_ways(line), elbow=0.0, wrist=0.0,
+            )  # fmt: skip
+            line = line.copy()
+            for i, (at, way) in enumerate(zip(arm.line, arm.way, strict=True)):
+                # Next to the armhole sections hold a part of the shoulder.
+                if i >= 4:
+                    cut = arm.cut(at, way)
+                    line[i] = 0.5 * (cut.min(axis=0) + cut.max(axis=0))
+            s = arc_lengths(line)
+            elbow, wrist = (float(np.interp(ARM_PLACES[name], at_model, s)) for name in ("elbow", "wrist"))
+            self.arms[side] = replace(arm, s=s, line=line, way=_ways(line), elbow=elbow, wrist=wrist)
 
     def _level_sections(self) -> tuple[TrunkSections, LegSections]:
         """Slice trunk and legs, the left and the right half by itself.
@@ -210,23 +224,6 @@ class BodySections:
             girths={side: np.array(each) for side, each in girths.items()},
         )  # fmt: skip
         return trunk, legs
-
-    def _arm(self, side: str, slicer: Slicer, scan: Slicer) -> ArmSections:
-        """Slice an arm across the line through the middles of its vertices, and then of its sections."""
-        places = np.linspace(*_ARM, _ARM_COUNT)
-        line = np.array([value_at(near_place(float(at), side), self.vertices) for at in places])
-        arm = ArmSections(
-            slicer=slicer, scan=scan, s=arc_lengths(line), line=line, way=_ways(line), elbow=0.0, wrist=0.0
-        )
-        line = line.copy()
-        for i, (at, way) in enumerate(zip(arm.line, arm.way, strict=True)):
-            # Next to the armhole sections hold a part of the shoulder.
-            if i >= 4:
-                cut = arm.cut(at, way)
-                line[i] = 0.5 * (cut.min(axis=0) + cut.max(axis=0))
-        s = arc_lengths(line)
-        elbow, wrist = (float(np.interp(ARM_PLACES[name], places, s)) for name in ("elbow", "wrist"))
-        return ArmSections(slicer=slicer, scan=scan, s=s, line=line, way=_ways(line), elbow=elbow, wrist=wrist)
 
 
 def _ways(line: FloatArray) -> FloatArray:

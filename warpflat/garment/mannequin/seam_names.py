@@ -48,8 +48,13 @@ def name_seams(
             [" ".join(word for word in first if word in second) for first, second in pairs],
             [" ".join(word for word in row if word not in common) for row in both],
         ]
-        if points is not None:
-            choices.append(_positions([np.mean(points[number], axis=0) for number in group]))
+        if points is not None and len(group) == 2:
+            # Two seams are told apart by where each lies against the other.
+            first_middle, second_middle = (np.mean(points[number], axis=0) for number in group)
+            apart = first_middle - second_middle
+            axis = max(_POSITIONS, key=lambda axis: abs(apart[axis]))
+            towards, against = _POSITIONS[axis]
+            choices.append([towards, against] if apart[axis] > 0 else [against, towards])
         chosen = next((choice for choice in choices if all(choice) and len(set(choice)) == len(group)), None)
         if chosen is not None and len(group) > 1:
             for number, word in zip(group, chosen, strict=True):
@@ -58,13 +63,3 @@ def name_seams(
     for name in names:
         taken.append(find_unused_name(name, taken))
     return tuple(taken)
-
-
-def _positions(centres: Sequence[FloatArray]) -> list[str]:
-    """Return where each of two seams lies against the other; nothing for one or for more."""
-    if len(centres) != 2:
-        return []
-    apart = centres[0] - centres[1]
-    axis = max(_POSITIONS, key=lambda axis: abs(apart[axis]))
-    towards, against = _POSITIONS[axis]
-    return [towards, against] if apart[axis] > 0 else [against, towards]

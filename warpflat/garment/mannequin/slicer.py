@@ -101,7 +101,21 @@ class Slicer:
         a, b = self.edges[used].T
         t = ((along[a] - offset) / (along[a] - along[b]))[:, None]
         points = (1 - t) * self.vertices[a] + t * self.vertices[b]
-        label = _part_labels(len(used), local)
+        # The part of each point, by its root: quicker than a sparse graph for a section's few points.
+        root, count = list(range(len(used))), 0
+        for i, k in local.tolist():
+            while root[i] != i:
+                root[i] = i = root[root[i]]
+            while root[k] != k:
+                root[k] = k = root[root[k]]
+            if i < k:
+                root[k] = i
+            else:
+                root[i] = k
+        for i, above in enumerate(root):
+            # A root stands before all that it leads.
+            root[i], count = (count, count + 1) if above == i else (root[above], count)
+        label = np.asarray(root)
         segments = np.linalg.norm(points[local[:, 0]] - points[local[:, 1]], axis=1)
         length = np.bincount(label[local[:, 0]], segments)
         patched = np.bincount(label[local[:, 0]], segments * (faces >= self.scanned))
@@ -115,22 +129,3 @@ class Slicer:
     def points(self, normal: FloatArray, offset: float) -> FloatArray:
         """Return the points of all parts of a section, #P by 3 [m]."""
         return np.concatenate([np.empty((0, 3)), *(part.points for part in self.cut(normal, offset))])
-
-
-def _part_labels(size: int, pairs: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return #size, the part of each point that the pairs join; quicker than a sparse graph for a section's few points."""
-    root = list(range(size))
-    for a, b in pairs.tolist():
-        while root[a] != a:
-            root[a] = a = root[root[a]]
-        while root[b] != b:
-            root[b] = b = root[root[b]]
-        if a < b:
-            root[b] = a
-        else:
-            root[a] = b
-    parts = 0
-    for i, above in enumerate(root):
-        # A root stands before all that it leads.
-        root[i], parts = (parts, parts + 1) if above == i else (root[above], parts)
-    return np.asarray(root)

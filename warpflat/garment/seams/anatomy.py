@@ -210,7 +210,17 @@ def find_anatomy(cloth: Cloth, *, up: str | None = None, front: str | None = Non
     if up:
         made = _worn(cloth, loops, AXES[up], front)
     else:
-        first = _upward([one for one in loops if one.length >= HOLE * cloth.size], cloth.vertices)
+        # +y is up, or +z where the openings lie level in z and not in y, or a garment that is open in front lies on its back.
+        first, openings = AXES["+y"], [one for one in loops if one.length >= HOLE * cloth.size]
+        if openings:
+            level = np.sum([one.length * np.abs(one.normal) for one in openings], axis=0)
+            longest = max(openings, key=lambda one: one.length)
+            lies = level[2] > 2.0 * level[1] and level[2] > level[0]
+            if np.linalg.norm(longest.normal) < RING and longest.length > 0.5 * sum(one.length for one in openings):
+                # The thinnest way through it is from back to front.
+                through = np.linalg.eigh(np.cov(cloth.vertices.T))[1][:, 0]
+                lies = np.abs(through).argmax() == 1
+            first = AXES["+z"] if lies else first
         made, turned = (_worn(cloth, loops, way, front) for way in (first, -first))
         made = turned if _wearable(cloth, turned) > _wearable(cloth, made) + _SURELY else made
         if made.up[1] < 0.5 and len(loops) > 1:
@@ -269,7 +279,15 @@ def _worn(cloth: Cloth, raw: Sequence[Border], upward: FloatArray, front: str | 
     """
     size = cloth.size
     notes: list[str] = []
-    normal, offset, asymmetry = _plane_of_symmetry(cloth.vertices, _above_slanted_hem(cloth, upward, raw), upward, size)
+    # A hem that slants says nothing about the body: the cloth beside it has no mass.
+    heights, mass = cloth.vertices @ upward, cloth.mass
+    wide = [heights[one.vertices] for one in raw if one.length >= HOLE * size]
+    if len(wide) > 1:
+        hem = min(wide, key=lambda own: float(own.mean()))
+        above = mass * (heights > hem.max())
+        slants = np.ptp(hem) > END * np.ptp(heights) and above.sum() > _ENOUGH_ABOVE * mass.sum()
+        mass = above if slants else mass
+    normal, offset, asymmetry = _plane_of_symmetry(cloth.vertices, mass, upward, size)
     holds = asymmetry <= _SYMMETRIC * size
     side = unit(np.cross(upward, normal))
     beside, ahead = (
@@ -361,35 +379,10 @@ def describe(anatomy: Anatomy) -> str:
     return ", ".join(words)
 
 
-def _upward(loops: Sequence[Border], vertices: FloatArray) -> FloatArray:
-    """Return +y, or +z where the openings lie level in z and not in y, or a garment that is open in front lies on its back."""
-    if not loops:
-        return AXES["+y"]
-    level = np.sum([one.length * np.abs(one.normal) for one in loops], axis=0)
-    longest = max(loops, key=lambda one: one.length)
-    if np.linalg.norm(longest.normal) < RING and longest.length > 0.5 * sum(one.length for one in loops):
-        # The thinnest way through it is from back to front.
-        through = np.linalg.eigh(np.cov(vertices.T))[1][:, 0]
-        return AXES["+z"] if np.abs(through).argmax() == 1 else AXES["+y"]
-    return AXES["+z"] if level[2] > 2.0 * level[1] and level[2] > level[0] else AXES["+y"]
-
-
 def axis_name(direction: FloatArray) -> str:
     """Return the axis of space that is nearest to a direction, as "+y"."""
     k = int(np.abs(direction).argmax())
     return f"{'+' if direction[k] > 0 else '-'}{'xyz'[k]}"
-
-
-def _above_slanted_hem(cloth: Cloth, upward: FloatArray, loops: Sequence[Border]) -> FloatArray:
-    """Return the masses of vertices [m2]; 0 beside a hem that slants: it says nothing about the body."""
-    heights = cloth.vertices @ upward
-    wide = [heights[one.vertices] for one in loops if one.length >= HOLE * cloth.size]
-    if len(wide) < 2:
-        return cloth.mass
-    hem = min(wide, key=lambda own: float(own.mean()))
-    above = cloth.mass * (heights > hem.max())
-    slants = np.ptp(hem) > END * np.ptp(heights) and above.sum() > _ENOUGH_ABOVE * cloth.mass.sum()
-    return above if slants else cloth.mass
 
 
 def _plane_of_symmetry(
@@ -550,40 +543,28 @@ def _between_two(cloth: Cloth, lower: Border, upper: Border, upward: FloatArray)
     if apart < 0.2 * girth:
         return "band"
     if float((upper.middle - lower.middle) @ upward) > 0.5 * apart and girth > _SLIMMEST:
-        return _around_the_trunk(cloth, upper, float((cloth.vertices[lower.vertices] @ upward).max()), upward)
+        # Around the trunk a skirt is narrowest at its upper end, a waist. A top's end runs up and down between straps and armholes, or goes
+        # around a neck from which cloth lies over the shoulders. What widens again below a waist is a dress.
+        low = float((cloth.vertices[lower.vertices] @ upward).max())
+        heights = cloth.vertices @ upward
+        high = float(heights[upper.vertices].min())
+        if high - low < 0.02:
+            return "skirt"
+        everywhere = np.ones(len(cloth.faces), dtype=bool)
+        levels = np.linspace(high, low, 17)[1:-1]
+        girths = np.array([section(cloth, heights - level, everywhere)[0] for level in levels])
+        narrowest = int(girths.argmin())
+        if upper.length > _WAVES * girths[narrowest]:
+            return "dress" if high - low > _LONG else "top"
+        near = heights[cloth.faces].mean(axis=1) > high - END * (high - low)
+        area = cloth.face_areas[near]
+        lies = float((np.abs(cloth.face_normals[near] @ upward) * area).sum() / max(float(area.sum()), 1e-300))
+        if upper.length < _SLIMMEST and lies > FACES:
+            return "dress" if high - low > _LONG else "top"
+        if girths[narrowest] > _WAISTED * girths[0]:
+            return "skirt"
+        return "dress" if levels[narrowest] - low > _TO_THE_THIGH else "top"
     return "sleeve" if girth < _SLIMMEST and apart > 0.75 * girth and long < _PAIR_RATIO * short else "other"
-
-
-def _around_the_trunk(cloth: Cloth, upper: Border, low: float, upward: FloatArray) -> Kind:
-    """Return what a tube around the trunk is: a skirt is narrowest at its upper end, which is a waist.
-
-    A top's end runs up and down between straps and armholes, or goes around a neck from which cloth lies over the shoulders. What widens
-    again below a waist is a dress.
-
-    Args:
-        cloth: the tube.
-        upper: its upper border.
-        low: the height of its hem [m].
-        upward: direction.
-    """
-    heights = cloth.vertices @ upward
-    high = float(heights[upper.vertices].min())
-    if high - low < 0.02:
-        return "skirt"
-    everywhere = np.ones(len(cloth.faces), dtype=bool)
-    levels = np.linspace(high, low, 17)[1:-1]
-    girths = np.array([section(cloth, heights - level, everywhere)[0] for level in levels])
-    narrowest = int(girths.argmin())
-    if upper.length > _WAVES * girths[narrowest]:
-        return "dress" if high - low > _LONG else "top"
-    near = heights[cloth.faces].mean(axis=1) > high - END * (high - low)
-    area = cloth.face_areas[near]
-    lies = float((np.abs(cloth.face_normals[near] @ upward) * area).sum() / max(float(area.sum()), 1e-300))
-    if upper.length < _SLIMMEST and lies > FACES:
-        return "dress" if high - low > _LONG else "top"
-    if girths[narrowest] > _WAISTED * girths[0]:
-        return "skirt"
-    return "dress" if levels[narrowest] - low > _TO_THE_THIGH else "top"
 
 
 def _one_border(cloth: Cloth, border: Border, upward: FloatArray) -> Kind:

@@ -299,7 +299,18 @@ def leave_to_hand(cloth: Cloth, options: SeamOptions) -> tuple[Cloth, list[str]]
             a, b = cloth.vertices[line].transpose(1, 0, 2)
             length = np.linalg.norm(b - a, axis=1)
             beside = float(length[tree.query(0.5 * (a + b))[0] <= BESIDE * size].sum()) >= _MOSTLY * float(length.sum())
-            if options.keeps(name) or not (beside and _parted_without(cloth, name, line, pieces)):
+            if beside and not options.keeps(name):
+                # The pieces at both sides stay apart without it: most of each goes on in one of those that are left.
+                he = cloth.half_edges
+                sides = np.unique(pieces[he.face[are_among(he.edges, line)[he.edge]]])
+                left = replace(
+                    cloth, seams={**cloth.seams, name: cloth.seams[name][~are_among(cloth.seams[name], line)]}
+                ).parts
+                most = [
+                    int(np.bincount(left[pieces == one], cloth.face_areas[pieces == one]).argmax()) for one in sides
+                ]
+                beside = len(set(most)) == len(most)
+            if options.keeps(name) or not beside:
                 kept.append(line)
         if any(in_family(name, own) for own in names):
             kept = []
@@ -309,23 +320,6 @@ def leave_to_hand(cloth: Cloth, options: SeamOptions) -> tuple[Cloth, list[str]]
         if kept:
             cloth = cloth.with_seam(name, np.concatenate(kept))
     return cloth, notes
-
-
-def _parted_without(cloth: Cloth, name: str, line: Ids, pieces: Ids) -> bool:
-    """Return whether the pieces at both sides of a line stay apart without it.
-
-    Args:
-        cloth: with all seams.
-        name: of the line's seam.
-        line: its edges (#E by 2).
-        pieces: #F, the piece of each face that the seams would leave without those that are drawn.
-    """
-    he, seam = cloth.half_edges, cloth.seams[name]
-    beside = np.unique(pieces[he.face[are_among(he.edges, line)[he.edge]]])
-    left = replace(cloth, seams={**cloth.seams, name: seam[~are_among(seam, line)]}).parts
-    # Most of each piece goes on in one of those that are left.
-    most = [int(np.bincount(left[pieces == one], cloth.face_areas[pieces == one]).argmax()) for one in beside]
-    return len(set(most)) == len(most)
 
 
 def keep_seams(cloth: Cloth, anatomy: Anatomy, options: SeamOptions) -> tuple[Cloth, list[str]]:
@@ -343,29 +337,19 @@ def keep_seams(cloth: Cloth, anatomy: Anatomy, options: SeamOptions) -> tuple[Cl
     for name in options.keep:
         if any(in_family(seam.removeprefix(HAND), name) for seam in cloth.seams):
             continue
-        made = _kept(cloth, anatomy, name, options)
-        if made is None:
-            notes.append(f"there is no {name} to keep: none was found in what is taken for: {anatomy.kind}")
+        kept = cloth.with_labels(sleeve=cloth.labels.get("sleeve", np.full(len(cloth.faces), -1, dtype=np.int64)))
+        edges: Ids = np.empty((0, 2), dtype=np.int64)
+        if name in ("centre front", "centre back") and LEFT in kept.values:
+            kept, lines = centre_lines(kept)
+            edges = kept.new_edges(lines[name])
+        elif name in ("waist", "yoke") and (level := level_of(kept, anatomy, name, options)) is not None:
+            kept, _, _, edges = kept.parted(kept.vertices @ anatomy.up - level, kept.labels["sleeve"] < 0)
+            edges = kept.new_edges(edges)
+        if len(edges):
+            cloth = kept.with_seam(name, edges)
         else:
-            cloth = made
+            notes.append(f"there is no {name} to keep: none was found in what is taken for: {anatomy.kind}")
     return cloth, notes
-
-
-def _kept(cloth: Cloth, anatomy: Anatomy, name: str, options: SeamOptions) -> Cloth | None:
-    """Return the cloth with a centre line, a waist or a yoke; None where it has none."""
-    cloth = cloth.with_labels(sleeve=cloth.labels.get("sleeve", np.full(len(cloth.faces), -1, dtype=np.int64)))
-    if name in ("centre front", "centre back") and LEFT in cloth.values:
-        cloth, lines = centre_lines(cloth)
-        edges = lines[name]
-    elif name in ("waist", "yoke"):
-        level = level_of(cloth, anatomy, name, options)
-        if level is None:
-            return None
-        cloth, _, _, edges = cloth.parted(cloth.vertices @ anatomy.up - level, cloth.labels["sleeve"] < 0)
-    else:
-        return None
-    edges = cloth.new_edges(edges)
-    return cloth.with_seam(name, edges) if len(edges) else None
 
 
 def level_of(cloth: Cloth, anatomy: Anatomy, name: str, options: SeamOptions) -> float | None:

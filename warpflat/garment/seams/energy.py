@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core import (
-    BoolArray,
     InputError,
     find_unused_name,
     other_side,
@@ -188,9 +187,17 @@ def _drawn(
     if made is None:
         return None
     if line.name == WAIST:
-        # It goes all around.
+        # It goes all around, through the pieces of the trunk that its plane parts well inside.
+        beside = APART * anatomy.size
         for other in sorted(set(range(len(pieces))) - changed):
-            for mesh in _across(made, made.labels[OWNER] == other, line, anatomy):
+            crossed = [
+                mesh
+                for mesh in made.pieces(made.labels[OWNER] == other)
+                if made.sleeve_of(mesh) < 0
+                and (height := (mesh.vertices - line.point) @ line.normal).min() < -beside
+                and height.max() > beside
+            ]
+            for mesh in crossed:
                 changed.add(other)
                 made = _cut(made, mesh, line, _TRIAL) or made
     elif twin is not None or line.is_lopsided(anatomy):
@@ -363,17 +370,6 @@ def _twin(number: int, pieces: Sequence[Measured], anatomy: Anatomy) -> int | No
     if abs(across) < 0.04 * anatomy.size or away[nearest] > 0.06 * anatomy.size:
         return None
     return nearest if abs(pieces[nearest].area / pieces[number].area - 1.0) < 0.25 else None
-
-
-def _across(cloth: Cloth, among: BoolArray, line: Line, anatomy: Anatomy) -> list[PieceMesh]:
-    """Return the pieces of the trunk with some of these faces (#F) that a plane parts well inside."""
-    beside = APART * anatomy.size
-    found = []
-    for mesh in cloth.pieces(among):
-        height = (mesh.vertices - line.point) @ line.normal
-        if cloth.sleeve_of(mesh) < 0 and height.min() < -beside and height.max() > beside:
-            found.append(mesh)
-    return found
 
 
 def _cut(cloth: Cloth, mesh: PieceMesh, line: Line, name: str) -> Cloth | None:

@@ -210,7 +210,16 @@ def find_seams(
 def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric: Fabric | None) -> FoundSeams:
     cloth, holes = _without_holes(cloth)
     cloth, turned = without_thickness(cloth)
-    cloth, smoothed = _smoothed(cloth, options.smooth) if options.smooth else (cloth, [])
+    smoothed = list[str]()
+    if options.smooth:
+        # Smoothing once draws a tube in by the square of length over radius; what it took from its own result is given back, so that the
+        # fourth power is left.
+        once = cloth.smooth(cloth.vertices, options.smooth)
+        vertices = 2.0 * once - cloth.smooth(once, options.smooth)
+        shifts = 1e3 * np.linalg.norm(vertices - cloth.vertices, axis=1)
+        words = f"it moved by {shifts.mean():.1f} mm in the mean, {shifts.max():.1f} mm at most"
+        smoothed = [f"smoothed over {1e3 * options.smooth:g} mm, on request: {words}"]
+        cloth = replace(cloth, vertices=vertices)
     anatomy = find_anatomy(cloth, up=options.up, front=options.front)
     moved, even = "", False
     if not options.cuts:  # what the user draws on one side is on that side alone
@@ -227,7 +236,16 @@ def _find_in_layer(cloth: Cloth, surface: Surface, options: SeamOptions, fabric:
     cloth = replace(cloth, seams={name.removeprefix(HAND): edges for name, edges in cloth.seams.items()})
     trials, basic = list[Trial](), set(cloth.seams)
     if options.find == "none":
-        _require_open(cloth)
+        # What no cut opens is refused: closed pieces, and those with a handle.
+        for mesh in cloth.pieces():
+            loops = len(mesh.loops)
+            if loops == 0 or sum(mesh.shape) != 2:
+                x, y, z = (100.0 * mesh.vertices.mean(axis=0)).tolist()
+                what = "is closed" if loops == 0 else "has a handle"
+                raise InputError(
+                    f"what the cuts leave {what}, about ({x:.0f}, {y:.0f}, {z:.0f}) cm: cut it once more, or let "
+                    'find = "auto" (--seams auto) find the other seams'
+                )
     elif fabric is not None:
         try:
             cloth, trials = cut_by_energy(
@@ -318,36 +336,6 @@ def _laid_flat(
     return laid_flat(_surface_of(cloth, anatomy, mesh, surface), fabric, width)
 
 
-def _require_open(cloth: Cloth) -> None:
-    """Refuse what no cut opens: closed pieces, and those with a handle.
-
-    Raises:
-        InputError: there is one.
-    """
-    for mesh in cloth.pieces():
-        loops = len(mesh.loops)
-        if loops == 0 or sum(mesh.shape) != 2:
-            x, y, z = (100.0 * mesh.vertices.mean(axis=0)).tolist()
-            what = "is closed" if loops == 0 else "has a handle"
-            raise InputError(
-                f'what the cuts leave {what}, about ({x:.0f}, {y:.0f}, {z:.0f}) cm: cut it once more, or let find = "auto" (--seams auto) '
-                "find the other seams"
-            )
-
-
-def _smoothed(cloth: Cloth, length: float) -> tuple[Cloth, list[str]]:
-    """Return the cloth without wrinkles shorter than a few times a length [m], and a note on how far it has moved.
-
-    Smoothing once draws a tube in by the square of length over radius; what it took from its own result is given back, so that the
-    fourth power is left.
-    """
-    once = cloth.smooth(cloth.vertices, length)
-    vertices = 2.0 * once - cloth.smooth(once, length)
-    moved = 1e3 * np.linalg.norm(vertices - cloth.vertices, axis=1)
-    words = f"smoothed over {1e3 * length:g} mm, on request: it moved by {moved.mean():.1f} mm in the mean, {moved.max():.1f} mm at most"
-    return replace(cloth, vertices=vertices), [words]
-
-
 def _without_holes(cloth: Cloth) -> tuple[Cloth, list[str]]:
     """Return the cloth with its holes closed, and a note if there were any: nobody sews around a fault of the mesh, or a buttonhole."""
     vertices, fans, longest = [cloth.vertices], list[Ids](), 0.0
@@ -376,11 +364,7 @@ def cloth_of(surface: Surface) -> Cloth:
     """Return the cloth of a surface: its triangles, wound so that their normals point out."""
     triangles, _ = triangulate(surface.faces)
     cloth = Cloth(vertices=surface.vertices.copy(), faces=triangles.astype(np.int64))
-    return cloth if _volume(cloth) >= 0.0 else replace(cloth, faces=cloth.faces[:, ::-1].copy())
-
-
-def _volume(cloth: Cloth) -> float:
-    """Return the volume inside of a mesh whose borders are closed by fans [m3]; negative where normals point inwards."""
+    # Six times the volume inside, with borders closed by fans, is negative where normals point inwards.
     points = cloth.vertices - cloth.vertices[np.unique(cloth.faces)].mean(axis=0)
     a, b, c = points[cloth.faces].transpose(1, 0, 2)
     total = float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum())
@@ -388,43 +372,13 @@ def _volume(cloth: Cloth) -> float:
         ring = points[loop]
         following, middle = np.roll(ring, -1, axis=0), ring.mean(axis=0)
         total += float((np.cross(following, ring) @ middle).sum())
-    return total / 6.0
+    return cloth if total >= 0.0 else replace(cloth, faces=cloth.faces[:, ::-1].copy())
 
 
 def _as_surfaces(cloth: Cloth, anatomy: Anatomy, whole: Surface) -> list[Surface]:
     """Return the pieces as surfaces: named, with the stretches of their borders and their grain as lines."""
     meshes = list(cloth.pieces())
-    names = _names(cloth, anatomy, meshes)
-    label = {tuple(edge): name for name, edges in cloth.seams.items() for edge in edges.tolist()}
-    role = {
-        vertex: ROLES[int(number) - 1]
-        for vertex, number in enumerate(np.round(cloth.values["role"]).tolist())
-        if number > 0.0
-    }
-    he, beside = cloth.half_edges, dict[tuple[int, ...], list[int]]()
-    at_seam = np.flatnonzero(are_among(he.edges, cloth.seam_edges())[he.edge])
-    for edge, number in zip(he.edges[he.edge[at_seam]].tolist(), cloth.parts[he.face[at_seam]].tolist(), strict=True):
-        beside.setdefault(tuple(edge), []).append(number)
-    made = []
-    for number, mesh in enumerate(meshes):
-        piece = _surface_of(cloth, anatomy, mesh, whole, name=names[number])
-        lines = _edge_lines(piece, mesh, number, names, label, role, beside)
-        made.append(replace(piece, lines={**lines, **piece.lines}))
-    # Repairs of the whole are told once.
-    if made and whole.notes:
-        made[0] = replace(made[0], notes=whole.notes)
-    return made
-
-
-def _surface_of(cloth: Cloth, anatomy: Anatomy, mesh: PieceMesh, whole: Surface, *, name: str = "piece") -> Surface:
-    """Return a piece as a surface, with its grain."""
-    piece = replace(mesh.as_surface(name), sources=whole.sources)
-    grain = _grain(piece, cloth, mesh, anatomy)
-    return piece if grain is None else replace(piece, lines={GRAIN: grain})
-
-
-def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[str]:
-    """Return names of pieces: "left_sleeve", "front", "right_back_leg"; a number behind those that occur twice."""
+    # Pieces are called "left_sleeve", "front", "right_back_leg", with a number behind names that occur twice.
     area = cloth.face_areas
     plain, bands = list[str](), [_band(cloth, mesh) for mesh in meshes]
     sleeves = [cloth.sleeve_of(mesh) for mesh in meshes]
@@ -470,7 +424,66 @@ def _names(cloth: Cloth, anatomy: Anatomy, meshes: Sequence[PieceMesh]) -> list[
     for name in plain:
         seen[name] += 1
         names.append(f"{name}_{seen[name]}" if often[name] > 1 else name)
-    return names
+    label = {tuple(edge): name for name, edges in cloth.seams.items() for edge in edges.tolist()}
+    role = {
+        vertex: ROLES[int(number) - 1]
+        for vertex, number in enumerate(np.round(cloth.values["role"]).tolist())
+        if number > 0.0
+    }
+    he, beside = cloth.half_edges, dict[tuple[int, ...], list[int]]()
+    at_seam = np.flatnonzero(are_among(he.edges, cloth.seam_edges())[he.edge])
+    for edge, number in zip(he.edges[he.edge[at_seam]].tolist(), cloth.parts[he.face[at_seam]].tolist(), strict=True):
+        beside.setdefault(tuple(edge), []).append(number)
+    made = []
+    for number, mesh in enumerate(meshes):
+        piece = _surface_of(cloth, anatomy, mesh, whole, name=names[number])
+        lines = _edge_lines(piece, mesh, number, names, label, role, beside)
+        made.append(replace(piece, lines={**lines, **piece.lines}))
+    # Repairs of the whole are told once.
+    if made and whole.notes:
+        made[0] = replace(made[0], notes=whole.notes)
+    return made
+
+
+def _surface_of(cloth: Cloth, anatomy: Anatomy, mesh: PieceMesh, whole: Surface, *, name: str = "piece") -> Surface:
+    """Return a piece as a surface, with its grain if it has one: down the trunk and the leg, along a sleeve."""
+    piece = replace(mesh.as_surface(name), sources=whole.sources)
+    sleeve = cloth.sleeve_of(mesh)
+    sleeves = anatomy.limbs_of("sleeve")
+    # A garment that leans in its file hangs along its own plane of symmetry.
+    upright = anatomy.up if anatomy.mirror is None else anatomy.up - (anatomy.up @ anatomy.normal) * anatomy.normal
+    along = sleeves[sleeve].along if 0 <= sleeve < len(sleeves) else upright
+    if anatomy.kind not in TAILORED:
+        # A gore, a strip: nothing but its own length says how it hangs.
+        spread, axes = np.linalg.eigh(np.cov((piece.vertices - piece.vertices.mean(axis=0)).T))
+        along = axes[:, 2] if spread[2] > _LONG * spread[1] else along
+    facing = mesh.area_vectors.sum(axis=0)
+    middle = np.average(mesh.vertices[mesh.faces].mean(axis=1), axis=0, weights=np.maximum(mesh.face_areas, 1e-300))
+    count = np.bincount(mesh.vertex_of, minlength=len(cloth.vertices))
+    opened = mesh.vertices[count[mesh.vertex_of] > 1]
+    around = len(opened) > 0 and np.linalg.norm(facing) < 0.6 * mesh.face_areas.sum()
+    if around:
+        # It lies around a limb or the trunk: opposite to where it is opened.
+        facing = middle - opened.mean(axis=0)
+        rims = [limb for limb in anatomy.limbs if np.isin(anatomy.borders[limb.border].vertices, mesh.vertex_of).all()]
+        along = rims[0].along if len(rims) == 1 and rims[0].kind == "leg" else along
+    across = np.cross(along, facing)
+    if np.linalg.norm(across) < 0.1 * np.linalg.norm(facing) or not facing.any():
+        return piece
+    try:
+        if around:
+            # The plane meets it on both sides.
+            beyond = np.cross(across, along)
+            sections = plane_sections(piece, middle, across, towards=beyond if beyond @ facing > 0.0 else -beyond)
+            line = line_from_curve(piece, max(sections, key=lambda one: polyline_length(one.points)).points, name=GRAIN)
+        else:
+            line = line_on_plane(piece, middle, across)
+    except (InputError, ValueError):
+        return piece
+    reach = float(np.linalg.norm(piece.vertices[line[-1]] - piece.vertices[line[0]])) if len(line) > 1 else 0.0
+    if len(np.unique(line)) < len(line) or reach < 0.3 * float(np.ptp(piece.vertices @ along)):
+        return piece
+    return replace(piece, lines={GRAIN: np.asarray(line, dtype=np.int32)})
 
 
 def _band(cloth: Cloth, mesh: PieceMesh) -> str:
@@ -548,43 +561,3 @@ def _edge_lines(
             title = f"{plain} {words[-1]}" if several and other >= 0 else plain
             lines[find_unused_name(title, lines)] = np.array(run, dtype=np.int32)
     return lines
-
-
-def _grain(piece: Surface, cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy) -> NDArray[np.int32] | None:
-    """Return the line along which a piece's grain runs: down the trunk and the leg, along a sleeve; None where there is none."""
-    sleeve = cloth.sleeve_of(mesh)
-    sleeves = anatomy.limbs_of("sleeve")
-    # A garment that leans in its file hangs along its own plane of symmetry.
-    upright = anatomy.up if anatomy.mirror is None else anatomy.up - (anatomy.up @ anatomy.normal) * anatomy.normal
-    along = sleeves[sleeve].along if 0 <= sleeve < len(sleeves) else upright
-    if anatomy.kind not in TAILORED:
-        # A gore, a strip: nothing but its own length says how it hangs.
-        spread, axes = np.linalg.eigh(np.cov((piece.vertices - piece.vertices.mean(axis=0)).T))
-        along = axes[:, 2] if spread[2] > _LONG * spread[1] else along
-    facing = mesh.area_vectors.sum(axis=0)
-    middle = np.average(mesh.vertices[mesh.faces].mean(axis=1), axis=0, weights=np.maximum(mesh.face_areas, 1e-300))
-    count = np.bincount(mesh.vertex_of, minlength=len(cloth.vertices))
-    opened = mesh.vertices[count[mesh.vertex_of] > 1]
-    around = len(opened) > 0 and np.linalg.norm(facing) < 0.6 * mesh.face_areas.sum()
-    if around:
-        # It lies around a limb or the trunk: opposite to where it is opened.
-        facing = middle - opened.mean(axis=0)
-        rims = [limb for limb in anatomy.limbs if np.isin(anatomy.borders[limb.border].vertices, mesh.vertex_of).all()]
-        along = rims[0].along if len(rims) == 1 and rims[0].kind == "leg" else along
-    across = np.cross(along, facing)
-    if np.linalg.norm(across) < 0.1 * np.linalg.norm(facing) or not facing.any():
-        return None
-    try:
-        if around:
-            # The plane meets it on both sides.
-            beyond = np.cross(across, along)
-            sections = plane_sections(piece, middle, across, towards=beyond if beyond @ facing > 0.0 else -beyond)
-            line = line_from_curve(piece, max(sections, key=lambda one: polyline_length(one.points)).points, name=GRAIN)
-        else:
-            line = line_on_plane(piece, middle, across)
-    except (InputError, ValueError):
-        return None
-    reach = float(np.linalg.norm(piece.vertices[line[-1]] - piece.vertices[line[0]])) if len(line) > 1 else 0.0
-    if len(np.unique(line)) < len(line) or reach < 0.3 * float(np.ptp(piece.vertices @ along)):
-        return None
-    return np.asarray(line, dtype=np.int32)

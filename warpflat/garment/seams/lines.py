@@ -147,7 +147,31 @@ def offers(
     """
     laid = LaidCloth(piece.result.network, piece.result.positions)
     found = list[Offer]()
-    places = _places(piece, anatomy)
+    # Where a piece bulges, and where it stays beyond the cloth's limits: vertices, those of each kind with the most first.
+    vertices, faces = piece.surface.vertices, piece.surface.faces[:, :3].astype(np.int64)
+    mesh = TriangleMesh(vertices=vertices, faces=faces)
+    defect = mesh.curvature.copy()
+    defect[mesh.loops[0]] = 0.0
+    fit = piece.result.fit
+    beyond = np.where(fit.demand.beyond, fit.area, 0.0)
+    misfit = np.bincount(faces.ravel(), np.repeat(beyond / 3.0, 3), minlength=len(vertices))
+    edges = np.concatenate([mesh.half_edges.edges, mesh.half_edges.edges[:, ::-1]])
+    places = list[int]()
+    for whole, least in ((defect, _BULGE), (misfit, _MISFIT * misfit.sum())):
+        density = mesh.smooth(whole / mesh.mass, _SMOOTH * anatomy.size)
+        # Each vertex belongs to the peak that is reached from it by climbing.
+        by_density = edges[np.lexsort((density[edges[:, 1]], edges[:, 0]))]
+        steepest = by_density[np.append(by_density[1:, 0] != by_density[:-1, 0], True)]
+        up = np.arange(len(vertices))
+        climbs = density[steepest[:, 1]] > density[steepest[:, 0]]
+        up[steepest[climbs, 0]] = steepest[climbs, 1]
+        while (up[up] != up).any():
+            up = up[up]
+        total = np.bincount(up, np.maximum(density, 0.0) * mesh.mass, minlength=len(vertices))
+        tops = np.flatnonzero(total > max(least, 1e-12))
+        for top in tops[first_of_equals(np.asarray(total[tops], dtype=np.float64))][:_PLACES].tolist():
+            if all(np.linalg.norm(vertices[top] - vertices[one]) > APART * anatomy.size for one in places):
+                places.append(top)
     for line, rows in (
         *(_darts(cloth, piece, laid, places, anatomy, twice=twice) if not options.forbids("dart") else ()),
         *(_seams(cloth, piece, laid, places, anatomy, options, twice=twice) if may_part else ()),
@@ -217,35 +241,6 @@ def _darts(
 def _are_apart(rows: Sequence[Ids]) -> bool:
     """Return whether no vertex is in two rows, or twice in one."""
     return len(np.unique(np.concatenate(rows))) == sum(len(row) for row in rows)
-
-
-def _places(piece: Measured, anatomy: Anatomy) -> list[int]:
-    """Return where a piece bulges, and where it stays beyond the cloth's limits: vertices, those of each kind with the most first."""
-    vertices, faces = piece.surface.vertices, piece.surface.faces[:, :3].astype(np.int64)
-    mesh = TriangleMesh(vertices=vertices, faces=faces)
-    defect = mesh.curvature.copy()
-    defect[mesh.loops[0]] = 0.0
-    fit = piece.result.fit
-    beyond = np.where(fit.demand.beyond, fit.area, 0.0)
-    misfit = np.bincount(faces.ravel(), np.repeat(beyond / 3.0, 3), minlength=len(vertices))
-    edges = np.concatenate([mesh.half_edges.edges, mesh.half_edges.edges[:, ::-1]])
-    found = list[int]()
-    for whole, least in ((defect, _BULGE), (misfit, _MISFIT * misfit.sum())):
-        density = mesh.smooth(whole / mesh.mass, _SMOOTH * anatomy.size)
-        # Each vertex belongs to the peak that is reached from it by climbing.
-        order = edges[np.lexsort((density[edges[:, 1]], edges[:, 0]))]
-        steepest = order[np.append(order[1:, 0] != order[:-1, 0], True)]
-        up = np.arange(len(vertices))
-        climbs = density[steepest[:, 1]] > density[steepest[:, 0]]
-        up[steepest[climbs, 0]] = steepest[climbs, 1]
-        while (up[up] != up).any():
-            up = up[up]
-        total = np.bincount(up, np.maximum(density, 0.0) * mesh.mass, minlength=len(vertices))
-        tops = np.flatnonzero(total > max(least, 1e-12))
-        for top in tops[first_of_equals(np.asarray(total[tops], dtype=np.float64))][:_PLACES].tolist():
-            if all(np.linalg.norm(vertices[top] - vertices[one]) > APART * anatomy.size for one in found):
-                found.append(top)
-    return found
 
 
 def _seams(

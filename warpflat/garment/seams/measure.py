@@ -78,19 +78,6 @@ def without_memory(cloth: Cloth) -> Cloth:
     return cloth.with_labels(**{_FACE: None, OWNER: None})
 
 
-def _corners_laid(piece: Measured, anatomy: Anatomy) -> FloatArray:
-    """Return where the corners of a piece's faces lie in its layout, #F by 3 by 2 [m]."""
-    faces = piece.surface.faces[:, :3]
-    flat = piece.result.positions[faces]
-    if not piece.mirrored:
-        return flat
-    there, here = piece.surface.vertices[faces], piece.mesh.vertices[piece.mesh.faces]
-    there = anatomy.image(there)
-    face = cKDTree(there.mean(axis=1)).query(here.mean(axis=1))[1]
-    corner = np.linalg.norm(here[:, :, None] - there[face][:, None], axis=3).argmin(axis=2)
-    return np.asarray(flat[face[:, None], corner] * [-1.0, 1.0])
-
-
 def _layout_before(
     cloth: Cloth, mesh: PieceMesh, surface: Surface, pieces: Sequence[Measured], anatomy: Anatomy
 ) -> FloatArray | None:
@@ -115,7 +102,15 @@ def _layout_before(
         least = np.maximum(uu * vv - uv * uv, 1e-30)
         share = np.stack([(vv * wu - uv * wv) / least, (uu * wv - uv * wu) / least], axis=2)
         share = np.concatenate([1.0 - share.sum(axis=2, keepdims=True), share], axis=2)
-        corners = np.einsum("ikj,ijd->ikd", share, _corners_laid(old, anatomy)[place]).reshape(-1, 2)
+        # Where the corners of its faces lie in its layout, #F by 3 by 2 [m]: a mirror image has that of the piece that was flattened.
+        faces = old.surface.faces[:, :3]
+        flat = old.result.positions[faces]
+        if old.mirrored:
+            there, here = anatomy.image(old.surface.vertices[faces]), old.mesh.vertices[old.mesh.faces]
+            image = cKDTree(there.mean(axis=1)).query(here.mean(axis=1))[1]
+            corner = np.linalg.norm(here[:, :, None] - there[image][:, None], axis=3).argmin(axis=2)
+            flat = np.asarray(flat[image[:, None], corner] * [-1.0, 1.0])
+        corners = np.einsum("ikj,ijd->ikd", share, flat[place]).reshape(-1, 2)
         # Of the faces at a vertex, the one in which it lies the deepest.
         at, depth = mesh.faces[chosen].ravel(), share.min(axis=2).ravel()
         order = np.lexsort((-depth, at))

@@ -117,12 +117,6 @@ def is_open(mesh: PieceMesh) -> bool:
     return mesh.shape in ((1, 1), (2, 0))
 
 
-def _is_sewn_inside(cloth: Cloth, mesh: PieceMesh) -> bool:
-    """Return whether a piece is a flat ring with a seam around its hole: a pattern has holes, yet sews nothing into them."""
-    seams, borders = np.unique(cloth.seam_edges()), inner_borders(mesh.as_surface())
-    return any(turn <= -np.pi and np.isin(mesh.vertex_of[loop], seams).all() for loop, turn in borders)
-
-
 def _wide_borders(cloth: Cloth) -> list[float]:
     """Return the lengths of the borders of a cloth that are no holes [m]."""
     lengths = [polyline_length(cloth.vertices[loop], closed=True) for loop in cloth.loops]
@@ -186,8 +180,12 @@ def part_solids(
             area = float(cloth.face_areas[mesh.face_of].sum())
             key = _key(mesh, area)
             large, flat = shape and area > _LEAST * total, None
-            # What has no pattern, or one that nobody can sew, comes first and last; how many pieces there are is no matter.
-            if not is_open(mesh) or _is_sewn_inside(cloth, mesh):
+            # What has no pattern, or one that nobody can sew, comes first and last; how many pieces there are is no matter. A pattern has
+            # holes, yet sews nothing into them.
+            if not is_open(mesh) or any(
+                turn <= -np.pi and np.isin(mesh.vertex_of[loop], cloth.seam_edges()).all()
+                for loop, turn in inner_borders(mesh.as_surface())
+            ):
                 rank, value = 2, _strain(mesh, known) * area
             elif laid is not None and mesh.is_disk:
                 flat = laid(cloth, mesh)
@@ -444,7 +442,20 @@ def _best_way(
     image = None if mirror is None else mirror_image(mesh, mesh, mirror)
     found = list[tuple[float, Cloth, FloatArray]]()
     ways, is_round = _ways(mesh, None if image is None else mirror)
-    for field in ways if neck is None else [_across_neck(mesh, neck)]:
+    if neck is not None:
+        # At its neck and nowhere else, in the plane through the neck's ends at right angles to the cloth.
+        middle, points, normals = neck.mean(axis=0), mesh.vertices, mesh.area_vectors
+        away = np.linalg.norm(points[mesh.faces].mean(axis=1) - middle, axis=1)
+        near = away < max(np.linalg.norm(neck[1] - neck[0]), 2e-3)
+        along = np.cross(neck[1] - neck[0], normals[near].sum(axis=0) if near.any() else normals.sum(axis=0))
+        field = (points - middle) @ unit(along)
+        # Of what lies beyond the plane, only the part at the neck.
+        ahead = np.flatnonzero(field > 0.0)
+        if len(ahead):
+            first = ahead[np.linalg.norm(points[ahead] - middle, axis=1).argmin()]
+            field = np.where(mesh.reached(field > 0.0, np.array([first])), field, -np.abs(field))
+        ways = [field]
+    for field in ways:
         way = field
         if image is not None:
             other = field[image]
@@ -463,7 +474,10 @@ def _best_way(
         areas = [float(made.face_areas[part.face_of].sum()) for part in parts]
         if len(parts) == 1 or min(areas) < 0.3 * _LEAST * total:
             continue
-        cost = _SEAM * made.seam_length("way") / np.sqrt(sum(areas)) + sum(_topology(part) for part in parts)
+        # A part that is no disk costs more: a tube needs one more cut, anything else several.
+        shapes = [part.shape for part in parts]
+        undone = sum(0.01 * min(1 - euler, 1) + 0.2 * max(-euler, 0) if loops else 1.0 for loops, euler in shapes)
+        cost = _SEAM * made.seam_length("way") / np.sqrt(sum(areas)) + undone
         cost += _SEAM * (neck is None and is_round) * (max(areas) > (1.0 + ALIKE) * min(areas))
         cost += sum(_strain(part, known) * area for part, area in zip(parts, areas, strict=True)) / sum(areas)
         found.append((cost, made, way))
@@ -481,21 +495,6 @@ def _best_way(
     return None if best is None else best[1]
 
 
-def _across_neck(mesh: PieceMesh, neck: FloatArray) -> FloatArray:
-    """Return the field (#V) that cuts a part at its neck and nowhere else: in the plane through its ends at right angles to the cloth."""
-    middle, points, normals = neck.mean(axis=0), mesh.vertices, mesh.area_vectors
-    away = np.linalg.norm(points[mesh.faces].mean(axis=1) - middle, axis=1)
-    near = away < max(np.linalg.norm(neck[1] - neck[0]), 2e-3)
-    along = np.cross(neck[1] - neck[0], normals[near].sum(axis=0) if near.any() else normals.sum(axis=0))
-    field = (points - middle) @ unit(along)
-    # Of what lies beyond the plane, only the part at the neck.
-    ahead = np.flatnonzero(field > 0.0)
-    if len(ahead):
-        first = ahead[np.linalg.norm(points[ahead] - middle, axis=1).argmin()]
-        field = np.where(mesh.reached(field > 0.0, np.array([first])), field, -np.abs(field))
-    return field
-
-
 def parts_within(faces: IntArray, flat: FloatArray, width: float, tip: float = _LEAST) -> int:
     """Return in how many parts a pattern falls with half a width [m] taken off all around; 0 where nothing is left.
 
@@ -506,12 +505,3 @@ def parts_within(faces: IntArray, flat: FloatArray, width: float, tip: float = _
     rings = [shapely.Polygon(flat[loop]).buffer(0.0) for loop in border_loops(faces, flat)]
     whole = rings[0].difference(shapely.union_all(rings[1:]))
     return int((shapely.area(shapely.get_parts(whole.buffer(-0.5 * width))) > tip * whole.area).sum())
-
-
-def _topology(mesh: PieceMesh) -> float:
-    """Return what it costs that a part is no disk: a tube needs one cut, anything else more."""
-    loops, euler = mesh.shape
-    if loops == 0:
-        return 1.0
-    holes = 1 - euler
-    return 0.01 * min(holes, 1) + 0.2 * max(holes - 1, 0)

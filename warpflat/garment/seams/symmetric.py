@@ -57,9 +57,13 @@ def averaged(cloth: Cloth, anatomy: Anatomy) -> tuple[Cloth, str, bool]:
         there = image(border.middle[None])[0]
         mate = min(mates, key=lambda one: float(np.linalg.norm(one.middle - there)))
         fixed.append(border.vertices)
-        given.append(
-            _nearest_on_loop(image(vertices[mate.vertices]), vertices[border.vertices]) - vertices[border.vertices]
-        )
+        # Each vertex goes to the nearest place of that border's mirror image.
+        loop, points = image(vertices[mate.vertices]), vertices[border.vertices]
+        following = np.roll(loop, -1, axis=0)
+        share, off = project_on_segments(points[:, None], loop, following)
+        nearest = off.argmin(axis=1)
+        at = share[np.arange(len(points)), nearest][:, None]
+        given.append((1.0 - at) * loop[nearest] + at * following[nearest] - points)
     if fixed:
         held = np.concatenate(fixed)
         gap[held] = np.concatenate(given)
@@ -73,15 +77,6 @@ def averaged(cloth: Cloth, anatomy: Anatomy) -> tuple[Cloth, str, bool]:
     moved = 0.5 * away
     words = f"the cloth moved by {1e3 * float(share @ moved):.1f} mm in the mean, {1e3 * moved.max():.0f} mm at most"
     return replace(cloth, vertices=vertices + 0.5 * gap), words if moved.max() >= _TOLD else "", True
-
-
-def _nearest_on_loop(loop: FloatArray, points: FloatArray) -> FloatArray:
-    """Return the points of a closed line (#L by 3) that are nearest to others (#P by 3)."""
-    following = np.roll(loop, -1, axis=0)
-    share, away = project_on_segments(points[:, None], loop, following)
-    nearest = away.argmin(axis=1)
-    at = share[np.arange(len(points)), nearest][:, None]
-    return np.asarray((1.0 - at) * loop[nearest] + at * following[nearest])
 
 
 def mirrored(cloth: Cloth, anatomy: Anatomy) -> tuple[Cloth, str]:
@@ -130,8 +125,15 @@ def mirrored(cloth: Cloth, anatomy: Anatomy) -> tuple[Cloth, str]:
         labels=labels,
         seams=seams,
     )
-    why = _unlike(made, cloth)
-    return (cloth, why) if why else (made, "")
+    if (made.half_edges.count > 2).any():
+        return cloth, "its halves meet at more than the middle"
+    areas = [float(one.face_areas.sum()) for one in (made, cloth)]
+    if abs(areas[0] - areas[1]) > ALIKE * areas[1]:
+        return cloth, "one side has more cloth than the other"
+    shapes = [(one.shape, sorted(mesh.shape for mesh in one.pieces())) for one in (made, cloth)]
+    if shapes[0] != shapes[1]:
+        return cloth, "one side has openings, seams or pieces that the other has not"
+    return made, ""
 
 
 def _between_sides(cloth: Cloth, anatomy: Anatomy) -> FloatArray:
@@ -145,7 +147,8 @@ def _between_sides(cloth: Cloth, anatomy: Anatomy) -> FloatArray:
     farthest = np.zeros(LEVELS)
     np.maximum.at(farthest, level, np.abs(lateral))
     far = np.flatnonzero(np.abs(lateral) > np.maximum(_FAR * farthest[level], BESIDE_LINE * anatomy.size))
-    edges = cloth.half_edges.edges.astype(np.int64)
+    he = cloth.half_edges
+    edges = he.edges.astype(np.int64)
     # Where edges lie in the plane but for rounding, and along seams that keep near to it.
     exact = edges[(np.abs(lateral[edges]) < 1e-6 * anatomy.size).all(axis=1)]
     parts = [part for line in (exact, *cloth.seams.values()) for part in edge_components(line)]
@@ -154,18 +157,18 @@ def _between_sides(cloth: Cloth, anatomy: Anatomy) -> FloatArray:
         inner = np.setdiff1d(np.concatenate([np.empty(0, dtype=np.int64), *(part.ravel() for part in parts)]), far)
         fixed = np.concatenate([far, inner])
         field = cloth.solve(fixed, np.concatenate([lateral[far], np.zeros(len(inner))]))
-        # One that has the same side of the garment on both of its sides is not in it.
-        between = [part for part in parts if _changes_sign(cloth, field, part)]
+        # One that has the same side of the garment on both of its sides, along most of its edges, is not in it.
+        between = []
+        for part in parts:
+            beside = np.flatnonzero(are_among(he.edges, part)[he.edge])
+            third = field[cloth.faces[he.face[beside]].sum(axis=1) - he.tail[beside] - he.head[beside]]
+            left, right = np.unique(he.edge[beside[third > 0.0]]), np.unique(he.edge[beside[third < 0.0]])
+            if 2 * len(np.intersect1d(left, right)) > len(part):
+                between.append(part)
         if len(between) == len(parts):
             break
         parts = between
-    plain = np.setdiff1d(_plainly_across(cloth, field, lateral, anatomy), fixed)
-    given = np.concatenate([lateral[far], np.zeros(len(inner)), lateral[plain]])
-    return cloth.solve(np.concatenate([fixed, plain]), given)
-
-
-def _plainly_across(cloth: Cloth, field: FloatArray, lateral: FloatArray, anatomy: Anatomy) -> Ids:
-    """Return the vertices near the plane of symmetry in whose surroundings the cloth is steep to it, and goes as a field (#V) rises."""
+    # Near the plane of symmetry cloth plainly crosses it where all around is steep to it, and goes as the field rises.
     near = BESIDE_LINE * anatomy.size
     corners, normals = cloth.vertices[cloth.faces], cloth.face_normals
     # Of a linear function, by the edges opposite to the corners, each turned by a right angle.
@@ -176,24 +179,6 @@ def _plainly_across(cloth: Cloth, field: FloatArray, lateral: FloatArray, anatom
     away = np.full(len(lateral), np.inf)
     if other.any():
         away = cKDTree(corners[other].mean(axis=1)).query(cloth.vertices)[0]
-    return np.flatnonzero((np.abs(lateral) < near) & (away > near))
-
-
-def _changes_sign(cloth: Cloth, field: FloatArray, line: Ids) -> bool:
-    """Return whether a field (#V) has different signs on both sides of most of a line's edges (#E by 2)."""
-    he = cloth.half_edges
-    beside = np.flatnonzero(are_among(he.edges, line)[he.edge])
-    third = cloth.faces[he.face[beside]].sum(axis=1) - he.tail[beside] - he.head[beside]
-    left, right = (np.unique(he.edge[beside[chosen]]) for chosen in (field[third] > 0.0, field[third] < 0.0))
-    return 2 * len(np.intersect1d(left, right)) > len(line)
-
-
-def _unlike(made: Cloth, cloth: Cloth) -> str:
-    """Return in what a cloth differs from another one: in how its faces meet, its area, its borders and seams, or its pieces; or ""."""
-    if (made.half_edges.count > 2).any():
-        return "its halves meet at more than the middle"
-    areas = [float(one.face_areas.sum()) for one in (made, cloth)]
-    if abs(areas[0] - areas[1]) > ALIKE * areas[1]:
-        return "one side has more cloth than the other"
-    shapes = [(one.shape, sorted(mesh.shape for mesh in one.pieces())) for one in (made, cloth)]
-    return "" if shapes[0] == shapes[1] else "one side has openings, seams or pieces that the other has not"
+    plain = np.setdiff1d(np.flatnonzero((np.abs(lateral) < near) & (away > near)), fixed)
+    given = np.concatenate([lateral[far], np.zeros(len(inner)), lateral[plain]])
+    return cloth.solve(np.concatenate([fixed, plain]), given)

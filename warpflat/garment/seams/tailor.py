@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, FloatArray, reflected, unit
+from warpflat.core import FloatArray, reflected, unit
 from warpflat.flat import border_loops, components
 from warpflat.garment.seams.anatomy import Anatomy, Limb
 from warpflat.garment.seams.cloth import FACES, ISLAND, LEVELS, SAME_WAY, Cloth, edge_components, section
@@ -57,31 +57,11 @@ def draw_fields(cloth: Cloth, anatomy: Anatomy) -> Cloth:
     """Return the cloth with the fields whose zero lines are seams: front, left, "sleeve 0" and so on; symmetric where the garment is."""
     size, mirror = anatomy.size, anatomy.mirror
     normal = cloth.smooth(cloth.vertex_normals, _SMOOTH * size)
-    facing = normal @ anatomy.front / np.maximum(np.linalg.norm(normal, axis=1), 1e-3)
+    by_normals = normal @ anatomy.front / np.maximum(np.linalg.norm(normal, axis=1), 1e-3)
     armholes = _armhole_fields(cloth, anatomy)
-    facing = _around_limbs(facing, cloth, anatomy, armholes)
-    left = anatomy.across(cloth.vertices)
-    beside = [border for border in anatomy.borders if border.side]
-    if {border.side for border in beside} == {1, -1}:
-        given = np.concatenate([np.full(len(border.vertices), float(border.side)) for border in beside])
-        left = cloth.solve(np.concatenate([border.vertices for border in beside]), given)
-        left = left if mirror is None else mirror.symmetrised(left, -1.0)
-    # The cloth at the centre lines is wholly in front, or wholly behind.
-    changes = (left[cloth.faces].min(axis=1) < 0.0) & (left[cloth.faces].max(axis=1) >= 0.0)
-    centre = np.unique(cloth.faces[changes])
-    # Between, at a crotch, it faces neither way.
-    centre = centre[np.abs(facing[centre]) > FACES]
-    front = cloth.solve(centre, np.sign(facing[centre]), data=facing, length=2.0 * _SMOOTH * size)
-    front = front if mirror is None else mirror.symmetrised(front)
-    sleeves = {f"sleeve {number}": field for number, field in armholes.items()}
-    return cloth.with_values(**{FACING: front, LEFT: left}, **sleeves)
-
-
-def _around_limbs(facing: FloatArray, cloth: Cloth, anatomy: Anatomy, armholes: Mapping[int, FloatArray]) -> FloatArray:
-    """Return how far vertices face to the front; along sleeves and legs by their place around the axis, which wrinkles do not turn."""
-    made = facing.copy()
-    sleeves = anatomy.limbs_of("sleeve")
-    regions = [(limb, armholes[number]) for number, limb in enumerate(sleeves) if number in armholes]
+    # Along sleeves and legs the place around the axis says how far vertices face to the front: wrinkles do not turn it.
+    facing = by_normals.copy()
+    regions = [(limb, armholes[number]) for number, limb in enumerate(anatomy.limbs_of("sleeve")) if number in armholes]
     regions += [(limb, (limb.fork - cloth.vertices) @ anatomy.up) for limb in anatomy.limbs_of("leg")]
     for limb, beyond in regions:
         rim = anatomy.borders[limb.border].vertices
@@ -108,8 +88,22 @@ def _around_limbs(facing: FloatArray, cloth: Cloth, anatomy: Anatomy, armholes: 
         off = cloth.vertices[own] - np.polynomial.polynomial.polyval(t, curve).T
         off -= np.einsum("ij,ij->i", off, way)[:, None] * way
         weight = np.clip(4.0 * along[own], 0.0, 1.0)
-        made[own] = (1.0 - weight) * facing[own] + weight * (unit(off) @ anatomy.front)
-    return made
+        facing[own] = (1.0 - weight) * by_normals[own] + weight * (unit(off) @ anatomy.front)
+    left = anatomy.across(cloth.vertices)
+    beside = [border for border in anatomy.borders if border.side]
+    if {border.side for border in beside} == {1, -1}:
+        given = np.concatenate([np.full(len(border.vertices), float(border.side)) for border in beside])
+        left = cloth.solve(np.concatenate([border.vertices for border in beside]), given)
+        left = left if mirror is None else mirror.symmetrised(left, -1.0)
+    # The cloth at the centre lines is wholly in front, or wholly behind.
+    changes = (left[cloth.faces].min(axis=1) < 0.0) & (left[cloth.faces].max(axis=1) >= 0.0)
+    centre = np.unique(cloth.faces[changes])
+    # Between, at a crotch, it faces neither way.
+    centre = centre[np.abs(facing[centre]) > FACES]
+    front = cloth.solve(centre, np.sign(facing[centre]), data=facing, length=2.0 * _SMOOTH * size)
+    front = front if mirror is None else mirror.symmetrised(front)
+    sleeves = {f"sleeve {number}": field for number, field in armholes.items()}
+    return cloth.with_values(**{FACING: front, LEFT: left}, **sleeves)
 
 
 def _armhole_fields(cloth: Cloth, anatomy: Anatomy) -> dict[int, FloatArray]:
@@ -122,8 +116,17 @@ def _armhole_fields(cloth: Cloth, anatomy: Anatomy) -> dict[int, FloatArray]:
     limbs, size = anatomy.limbs_of("sleeve"), anatomy.size
     for number, limb in enumerate(limbs):
         fork, along = limb.fork, limb.along
+        outwards, up = limb.side * anatomy.normal, anatomy.up
+        outwards = unit(outwards - (outwards @ up) * up)
         for _ in range(2):
-            direction = _facing_of_armhole(anatomy, limb, along)
+            # It faces half way from the side to the sleeve, and not far below the level. It turns forwards with an arm as far as that is
+            # raised: a shoulder does. A sleeve that hangs is set forwards in its armhole.
+            half = outwards + along
+            rise = np.clip(np.arctan2(half @ up, max(float(half @ outwards), 1e-3)), _HANGS, _RAISED)
+            flat = half - (half @ up) * up
+            flat -= (1.0 - max(rise / _RAISED, 0.0)) * (flat - (flat @ outwards) * outwards)
+            angle = rise - _LEAN
+            direction = np.asarray(np.cos(angle) * unit(flat) + np.sin(angle) * up)
             outside = _outside(cloth, anatomy, limb, (cloth.vertices - fork) @ direction)
             if outside is None:
                 break
@@ -149,21 +152,6 @@ def _armhole_fields(cloth: Cloth, anatomy: Anatomy) -> dict[int, FloatArray]:
                 found[number] = both, level
                 found[mate] = reflected(both, normal), level - 2.0 * anatomy.offset * float(both @ normal)
     return {number: cloth.vertices @ direction - at for number, (direction, at) in found.items()}
-
-
-def _facing_of_armhole(anatomy: Anatomy, limb: Limb, along: FloatArray) -> FloatArray:
-    """Return the normal of an armhole's plane: half way from the side to the sleeve, and not far below the level.
-
-    It turns forwards with an arm as far as that is raised: a shoulder does. A sleeve that hangs is set forwards in its armhole.
-    """
-    outwards, up = limb.side * anatomy.normal, anatomy.up
-    outwards = unit(outwards - (outwards @ up) * up)
-    half = outwards + along
-    rise = np.clip(np.arctan2(half @ up, max(float(half @ outwards), 1e-3)), _HANGS, _RAISED)
-    level = half - (half @ up) * up
-    level -= (1.0 - max(rise / _RAISED, 0.0)) * (level - (level @ outwards) * outwards)
-    angle = rise - _LEAN
-    return np.asarray(np.cos(angle) * unit(level) + np.sin(angle) * up)
 
 
 def _outside(cloth: Cloth, anatomy: Anatomy, limb: Limb, height: FloatArray) -> tuple[float, FloatArray] | None:
@@ -265,7 +253,14 @@ def cut_as_a_tailor(cloth: Cloth, anatomy: Anatomy, *, hood: bool = True) -> tup
     for number, _, limb in sleeves:
         if number not in cloth.labels["sleeve"]:
             continue
-        cloth = _open_sleeve(cloth, ahead, number, limb, low, anatomy)
+        # It is opened along the line that goes on from the side seam.
+        own = cloth.labels["sleeve"] == number
+        armhole = np.intersect1d(cloth.faces[own], cloth.faces[~own])
+        for part in edge_components(cloth.line_between(ahead, own)):
+            touches = np.unique(part)
+            if all(np.isin(touches, known).any() for known in (armhole, low, cloth.border_edges)):
+                cloth = cloth.with_seam(f"underarm {side_word(limb.side)}", part)
+                break
     return cloth, notes
 
 
@@ -343,14 +338,19 @@ def _cut_hood(cloth: Cloth, anatomy: Anatomy) -> Cloth:
         (float(limb.fork @ anatomy.up) for limb in anatomy.limbs_of("sleeve")), default=top - 0.4 * anatomy.size
     )
     levels = np.linspace(shoulder, top, LEVELS)[1:-1]
-    # Around the cloth and across the opening: a hood is open there.
-    girths = np.array(
-        [
-            section(cloth, heights - level, trunk)[0]
-            + _across(cloth.vertices[opening.vertices], heights[opening.vertices] - level)
-            for level in levels
-        ]
-    )
+    loop, around = cloth.vertices[opening.vertices], list[float]()
+    for level in levels:
+        # Around the cloth, and across the opening between the two places where that is as high: a hood is open there.
+        girth, height = section(cloth, heights - level, trunk)[0], heights[opening.vertices] - level
+        under = height < 0.0
+        first = np.flatnonzero(under != np.roll(under, -1))
+        if len(first) == 2:
+            following = (first + 1) % len(loop)
+            share = (height[first] / (height[first] - height[following]))[:, None]
+            one, other = loop[first] + share * (loop[following] - loop[first])
+            girth += float(np.linalg.norm(other - one))
+        around.append(girth)
+    girths = np.array(around)
     # The narrowest level above which it is wider again, and below which the shoulders are much wider.
     above, below = np.maximum.accumulate(girths[::-1])[::-1], np.maximum.accumulate(girths)
     is_neck = (above > _WIDER * girths) & (below > _SHOULDERS * girths)
@@ -375,31 +375,3 @@ def _cut_hood(cloth: Cloth, anatomy: Anatomy) -> Cloth:
     trial = trial.with_labels(sleeve=np.where(hood, number, trial.labels["sleeve"])).with_seam("hood", edges)
     trial, _, _, middle = trial.parted(LEFT, hood)
     return trial.with_seam("hood centre", middle)
-
-
-def _across(loop: FloatArray, height: FloatArray) -> float:
-    """Return the way across a closed line (#L by 3) between the two places where its height (#L) is 0 [m]; 0 where it has not two."""
-    below = height < 0.0
-    first = np.flatnonzero(below != np.roll(below, -1))
-    if len(first) != 2:
-        return 0.0
-    following = (first + 1) % len(loop)
-    share = (height[first] / (height[first] - height[following]))[:, None]
-    one, other = loop[first] + share * (loop[following] - loop[first])
-    return float(np.linalg.norm(other - one))
-
-
-def _open_sleeve(cloth: Cloth, ahead: BoolArray, number: int, limb: Limb, low: Ids, anatomy: Anatomy) -> Cloth:
-    """Return the cloth with a sleeve opened along the line that goes on from the side seam."""
-    own = cloth.labels["sleeve"] == number
-    name = f"underarm {side_word(limb.side)}"
-    armhole = np.intersect1d(cloth.faces[own], cloth.faces[~own])
-    for part in edge_components(cloth.line_between(ahead, own)):
-        touches = np.unique(part)
-        if (
-            np.isin(touches, armhole).any()
-            and np.isin(touches, low).any()
-            and np.isin(touches, cloth.border_edges).any()
-        ):
-            return cloth.with_seam(name, part)
-    return cloth

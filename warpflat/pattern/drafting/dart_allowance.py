@@ -53,7 +53,17 @@ def dart_allowance(
     if not isinstance(wedge, Wedge) or not isinstance(left, Side) or not isinstance(right, Side):
         raise InputError("two darts meet in one point of the border: leave an edge between them")
     mouth_left, mouth_right = wedge.left[0], wedge.right[-1]
-    on_left, on_right = _prolonged_legs(wedge, left, right)
+    # The legs run straight on, but bend at a hem so that it folds up flat: what is turned up is then as long, from side to side, as
+    # what it lies on. Both bend by the same angle, so that the wedge can be folded on its middle.
+    on_left, on_right = unit(mouth_left - wedge.tip), unit(mouth_right - wedge.tip)
+    if left.kind == right.kind == "hem":
+        depth = max(left.width, right.width)
+        hem_left, hem_right = _secant_direction(left.points[::-1], depth), _secant_direction(right.points, depth)
+        leg_left, leg_right = _secant_direction(wedge.left, depth), _secant_direction(wedge.right[::-1], depth)
+        above = angle_between(hem_left, leg_left) + angle_between(hem_right, leg_right)
+        bend = (angle_between(hem_left, on_left) + angle_between(hem_right, on_right) - above) / 2
+        if abs(bend) <= HEM_SLANT:
+            on_left, on_right = rotation(-bend) @ on_left, rotation(bend) @ on_right
     strips[before], end_left = _end_at_leg(strips[before], left.width, mouth_left, on_left, left.arrives, mouth_right)
     strips[after], end_right = _end_at_leg(strips[after], right.width, mouth_right, on_right, -right.leaves, mouth_left)
     # The wedge is folded on the chord of a leg, which a curved leg leaves.
@@ -73,25 +83,6 @@ def dart_allowance(
             "turn the dart, or open it less"
         )
     return (on_left, on_right), [end_left, end_right, *lobes, cap, reflect(cap, wedge.tip, wedge.middle)], notes
-
-
-def _prolonged_legs(wedge: Wedge, left: Side, right: Side) -> tuple[FloatArray, FloatArray]:
-    """Return the unit vectors in which a dart's legs run on through the allowance.
-
-    They run straight on, but bend at a hem so that it folds up flat: what is turned up is then as long, from side to
-    side, as what it lies on. Both legs bend by the same angle, so that the wedge can be folded on its middle.
-    """
-    to_left, to_right = unit(wedge.left[0] - wedge.tip), unit(wedge.right[-1] - wedge.tip)
-    if not left.kind == right.kind == "hem":
-        return to_left, to_right
-    depth = max(left.width, right.width)
-    hem_left, hem_right = _secant_direction(left.points[::-1], depth), _secant_direction(right.points, depth)
-    leg_left, leg_right = _secant_direction(wedge.left, depth), _secant_direction(wedge.right[::-1], depth)
-    above = angle_between(hem_left, leg_left) + angle_between(hem_right, leg_right)
-    bend = (angle_between(hem_left, to_left) + angle_between(hem_right, to_right) - above) / 2
-    if abs(bend) > HEM_SLANT:
-        return to_left, to_right
-    return rotation(-bend) @ to_left, rotation(bend) @ to_right
 
 
 def _half_cap(

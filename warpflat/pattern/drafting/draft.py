@@ -38,7 +38,6 @@ from warpflat.pattern.drafting.fitting import (
 from warpflat.pattern.drafting.label import Label
 from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.notches import cut_darts, dart_notches, seam_notches, seam_reports
-from warpflat.pattern.drafting.piece_parts import Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam
 from warpflat.pattern.drafting.placement import default_grain, place_label
 from warpflat.pattern.drafting.polygons import mapped, upright
@@ -267,6 +266,8 @@ def _fitted_edges(
     pieces: Sequence[Piece], seams: Sequence[Seam], tolerance: float | None, *, true: bool
 ) -> tuple[dict[str, tuple[DraftedEdge, ...]], list[CornerReport]]:
     """Return the edges of all pieces as curves with trued corners, by piece, and a report on each."""
+    import shapely
+
     lines: dict[tuple[str, str], FloatArray] = {}
     for piece in pieces:
         frame = _frame(piece)
@@ -282,26 +283,26 @@ def _fitted_edges(
     trued = uncrossed(pieces, lines, as_in_layout(lines, seams, trued))
     edges = {}
     for piece in pieces:
-        keys = [(piece.name, edge.name) for edge in piece.edges]
-        edges[piece.name] = tuple(
-            _drafted_edge(edge, trued[key], (curves[key], fitted[key][1]), lines[key])
-            for edge, key in zip(piece.edges, keys, strict=True)
-        )
+        drafted = list[DraftedEdge]()
+        for edge in piece.edges:
+            key = (piece.name, edge.name)
+            line, marks = trued[key].sample(), shapely.points(lines[key])
+            # The fit is that before truing.
+            untrued = shapely.LineString(line if trued[key] is curves[key] else curves[key].sample())
+            drafted.append(
+                DraftedEdge(
+                    edge=edge,
+                    curve=trued[key],
+                    line=line,
+                    width=edge.width,
+                    places=lengths_along(trued[key], lines[key]),
+                    fit_error=float(shapely.distance(untrued, marks).max()),
+                    tolerance=fitted[key][1],
+                    mesh_vertices=edge.vertices,
+                )
+            )
+        edges[piece.name] = tuple(drafted)
     return edges, corners
-
-
-def _drafted_edge(edge: Edge, curve: Curve, fitted: tuple[Curve, float], points: FloatArray) -> DraftedEdge:
-    """Return an edge with its trued curve, and the places of its points along that; its fit is that before truing."""
-    import shapely
-
-    line, marks = curve.sample(), shapely.points(points)
-    places = lengths_along(curve, points)
-    untrued = shapely.LineString(line if curve is fitted[0] else fitted[0].sample())
-    fit_error = float(shapely.distance(untrued, marks).max())
-    return DraftedEdge(
-        edge=edge, curve=curve, line=line, width=edge.width, places=places, fit_error=fit_error, tolerance=fitted[1],
-        mesh_vertices=edge.vertices,
-    )  # fmt: skip
 
 
 def nest_label(pieces: Sequence[DraftedPiece]) -> Label:

@@ -130,7 +130,18 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
 
     middle = pieces[len(pieces) // 2]
     longest = max(pieces, key=lambda piece: sum(edge.length for edge in piece.fold_edges))
-    edge, joints = _widest_edge(pieces), shapely.MultiLineString([] if paper is None else list(paper.joints))
+    joints = shapely.MultiLineString([] if paper is None else list(paper.joints))
+
+    def shift_across(name: str) -> float:
+        first, last = (resample(piece.edge(name).line, 0.5) for piece in (pieces[0], pieces[-1]))
+        start, end = pieces[0].edge(name).line[[0, -1]]
+        x, y = unit(end - start)
+        return abs(float((last - first) @ [y, -x]))
+
+    # A size is easiest to read off its line along the edge of all sizes where they lie farthest apart.
+    names = [each.name for each in pieces[0].edges if each.kind not in ("fold", "dart")]
+    shared = [name for name in names if all(name in {each.name for each in piece.edges} for piece in pieces)]
+    edge = max(shared, key=lambda name: shift_across(name) * pieces[0].edge(name).length ** 0.5, default="")
     sizes = ", ".join(piece.size for piece in pieces)
     drawings = list[Drawing]()
     for index, piece in enumerate(pieces):
@@ -161,20 +172,6 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
             words += _size_tags(piece, edge, (index + 0.5) / len(pieces), shapely.union_all([*lines, *boxes]), joints)
         drawings.append(Drawing(piece=piece, strokes=tuple(strokes), words=tuple(words)))
     return tuple(drawings)
-
-
-def _widest_edge(pieces: Sequence[DraftedPiece]) -> str:
-    """Return the edge that all sizes have along which they lie farthest apart: there a size is easiest to read off its line."""
-
-    def shift_across(name: str) -> float:
-        first, last = (resample(piece.edge(name).line, 0.5) for piece in (pieces[0], pieces[-1]))
-        start, end = pieces[0].edge(name).line[[0, -1]]
-        x, y = unit(end - start)
-        return abs(float((last - first) @ [y, -x]))
-
-    names = [e.name for e in pieces[0].edges if e.kind not in ("fold", "dart")]
-    shared = [name for name in names if all(name in {e.name for e in piece.edges} for piece in pieces)]
-    return max(shared, key=lambda name: shift_across(name) * pieces[0].edge(name).length ** 0.5, default="")
 
 
 def _size_tags(piece: DraftedPiece, name: str, share: float, avoided: Geometry, joints: Geometry) -> list[Words]:
@@ -345,7 +342,16 @@ class _Annotations:
         for stroke in grain:
             self._room.take(shapely.LineString(stroke.points))
         beyond = [self._bracket(fold) for fold in piece.fold_edges]
-        named = self._named_lines(borders=borders)
+        # The lines that get a name: the name, its line, and whether it stands to the left of the line or above it.
+        first_legs = {dart.dart.left: dart.dart.name for dart in piece.darts}
+        second_legs = {dart.dart.right for dart in piece.darts}
+        named = [(name, line, "above") for name, line in piece.internal_lines.items()]
+        for edge in piece.edges:
+            if edge.name in first_legs:
+                named.append((first_legs[edge.name], piece.drawn_line(edge), "left"))
+            elif borders and edge.kind != "fold" and edge.name not in second_legs:
+                named.append((edge.name, edge.line, "left"))
+        named += [(name, fisheye_legs(line)[0][::-1], "left") for name, line in piece.fisheyes.items()]
         drawn = [shapely.LineString(line) for _, line, _ in named]
         self._name_lines(named, drawn)
         self._name_buttons(drawn)
@@ -389,19 +395,6 @@ class _Annotations:
         if self._paper is not None:
             self._room.take(beyond)
         return beyond
-
-    def _named_lines(self, *, borders: bool) -> list[tuple[str, FloatArray, str]]:
-        """Return the lines that get a name: the name, its line, and whether it stands to the left of the line or above it."""
-        piece = self._piece
-        first_legs = {dart.dart.left: dart.dart.name for dart in piece.darts}
-        second_legs = {dart.dart.right for dart in piece.darts}
-        named = [(name, line, "above") for name, line in piece.internal_lines.items()]
-        for edge in piece.edges:
-            if edge.name in first_legs:
-                named.append((first_legs[edge.name], piece.drawn_line(edge), "left"))
-            elif borders and edge.kind != "fold" and edge.name not in second_legs:
-                named.append((edge.name, edge.line, "left"))
-        return named + [(name, fisheye_legs(line)[0][::-1], "left") for name, line in piece.fisheyes.items()]
 
     def _name_lines(self, named: Sequence[tuple[str, FloatArray, str]], drawn: Sequence[Geometry]) -> None:
         """Write the names of lines along them, each clear of the other lines."""

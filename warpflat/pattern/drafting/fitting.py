@@ -129,7 +129,21 @@ def fit_edges(
                     if difference <= TOLERANCE and not any(map(_ragged, curves)):
                         break
                 fitted[first], fitted[second] = (found[0], used), (found[1].reversed() if against else found[1], used)
-    _keep_near(pieces, lines, sewn, fitted, tolerance)
+    # The curves of clean edges are brought within the tolerance of their points, where their seams allow it.
+    within = TOLERANCE if tolerance is None else tolerance
+    keys = [(piece.name, edge.name) for piece in pieces for edge in piece.edges if edge.kind != "fold"]
+    far = [key for key in keys if fitted[key][1] <= within and farthest(fitted[key][0].sample(), lines[key]) > within]
+    tried = fitted | {key: (fit_curve(lines[key], within, near=True), within) for key in far}
+    unchecked = list(sewn)
+    # The edges of a mirror pair are sewn at two seams: a curve that one of them rejects changes the other.
+    while unequal := [seam for seam in unchecked if max(_differences(seam, lines, tried)) > SAFE]:
+        for seam in unequal:
+            near, before = (max(_differences(seam, lines, curves)) for curves in (tried, fitted))
+            # On a coarse mesh neither may be as close as it should be.
+            if before <= max(near, 1.0):
+                tried |= {side.place: fitted[side.place] for side in seam.stretches}
+        unchecked = [seam for seam in unchecked if seam not in unequal]
+    fitted |= tried
     clean = uncrossed(pieces, lines, {key: curve for key, (curve, _) in fitted.items()})
     return {key: (clean[key], width) for key, (_, width) in fitted.items()}
 
@@ -376,30 +390,6 @@ def is_wavy(curve: Curve) -> bool:
     mean = np.convolve(np.pad(direction, width, mode="edge"), np.full(width, 1.0 / width), mode="valid")
     swing = float(np.abs(np.diff(direction)).sum() - np.abs(np.diff(mean)).sum())
     return swing > SWING + SWING_PER_METRE * float(arc[-1])
-
-
-def _keep_near(
-    pieces: Sequence[Piece],
-    lines: Mapping[EdgeKey, FloatArray],
-    seams: Sequence[Seam],
-    fitted: dict[EdgeKey, tuple[Curve, float]],
-    tolerance: float | None,
-) -> None:
-    """Bring the curves of clean edges within the tolerance of their points, where their seams allow it."""
-    within = TOLERANCE if tolerance is None else tolerance
-    keys = [(piece.name, edge.name) for piece in pieces for edge in piece.edges if edge.kind != "fold"]
-    far = [key for key in keys if fitted[key][1] <= within and farthest(fitted[key][0].sample(), lines[key]) > within]
-    tried = fitted | {key: (fit_curve(lines[key], within, near=True), within) for key in far}
-    unchecked = list(seams)
-    # The edges of a mirror pair are sewn at two seams: a curve that one of them rejects changes the other.
-    while unequal := [seam for seam in unchecked if max(_differences(seam, lines, tried)) > SAFE]:
-        for seam in unequal:
-            near, before = (max(_differences(seam, lines, curves)) for curves in (tried, fitted))
-            # On a coarse mesh neither may be as close as it should be.
-            if before <= max(near, 1.0):
-                tried |= {side.place: fitted[side.place] for side in seam.stretches}
-        unchecked = [seam for seam in unchecked if seam not in unequal]
-    fitted |= tried
 
 
 def _along_sides(

@@ -114,7 +114,17 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
     import shapely
 
     axis = _axis(piece)
-    edges = _clipped_edges(piece, axis, side)
+    # What of the edges lies on one side of the axis, in order, the first after the gap where the other half was.
+    edges = list[DraftedEdge]()
+    for whole in piece.edges:
+        clipped = [_clipped(control, axis, side) for control in whole.curve.bezier]
+        has_part = np.array([part is not None for part in clipped])
+        if has_part.any():
+            bezier = np.stack([part for part in clipped if part is not None])
+            edges.append(_with_curve(whole, Curve(bezier=bezier, straight=whole.curve.straight[has_part])))
+    gaps = [float(np.linalg.norm(edges[k - 1].line[-1] - edges[k].line[0])) for k in range(len(edges))]
+    first = next(k for k, gap in enumerate(gaps) if gap > 10 * SAME_POINT)
+    edges = [*edges[first:], *edges[:first]]
     ends = edges[-1].line[-1], edges[0].line[0]
     shift = -min(ends, key=lambda end: float(end[1]))
     names = {edge.name: without_side(edge.name) for edge in edges}
@@ -176,20 +186,6 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
     on_side = _notches_beside(piece, garment.garment.seams, names, axis, side)
     notches = tuple(_on_half(notch, moved, shift, side) for notch in on_side)
     return draft_half(half, garment.name, (*moved, drafted), notches, piece.notes)
-
-
-def _clipped_edges(piece: DraftedPiece, axis: float, side: float) -> list[DraftedEdge]:
-    """Return what of a piece's edges lies on one side of its axis, in order, the first after the gap where the other half was."""
-    edges = []
-    for whole in piece.edges:
-        clipped = [_clipped(control, axis, side) for control in whole.curve.bezier]
-        has_part = np.array([part is not None for part in clipped])
-        if has_part.any():
-            bezier = np.stack([part for part in clipped if part is not None])
-            edges.append(_with_curve(whole, Curve(bezier=bezier, straight=whole.curve.straight[has_part])))
-    gaps = [float(np.linalg.norm(edges[k - 1].line[-1] - edges[k].line[0])) for k in range(len(edges))]
-    first = next(k for k, gap in enumerate(gaps) if gap > 10 * SAME_POINT)
-    return [*edges[first:], *edges[:first]]
 
 
 def _notches_beside(

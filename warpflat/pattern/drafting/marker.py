@@ -162,6 +162,8 @@ def make_marker(
     Raises:
         InputError: an unknown size or fabric, or a piece wider than the cloth.
     """
+    import shapely
+
     wanted = dict.fromkeys(garment.pieces, 1) if sizes is None else sizes
     if cloth.by_rule:
         placements = _laid_by_rule(garment, cloth, fabric, wanted)
@@ -184,7 +186,15 @@ def make_marker(
         placements=named,
         folded=cloth.folded,
     )
-    _check(marker)
+    # Copies do not overlap and lie on the cloth, whatever the solver says.
+    polygons = [shapely.Polygon(copy.cut_line) for copy in marker.placements]
+    for a, b in shapely.STRtree(polygons).query(polygons, predicate="intersects").T:
+        if a < b and polygons[a].intersection(polygons[b]).area > OVERLAP:
+            raise RuntimeError(f"the nesting overlaps: {marker.placements[a].label}, {marker.placements[b].label}")
+    for copy in marker.placements:
+        low, high = copy.cut_line.min(axis=0), copy.cut_line.max(axis=0)
+        if low.min() < -1e-6 or high[0] > marker.length + 1e-6 or high[1] > marker.width + 1e-6:
+            raise RuntimeError(f"the nesting puts {copy.label} beyond the cloth")
     return marker
 
 
@@ -268,20 +278,6 @@ def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seco
         turned, shift = rotation(np.radians(item.rotation)) @ matrices[int(item.id)], np.array(item.translation) / 1000
         placements.append(_placed(*copies[int(item.id)], np.column_stack([turned, shift + cloth.gap])))
     return placements
-
-
-def _check(marker: Marker) -> None:
-    """Check that copies do not overlap and lie on the cloth, whatever the solver says."""
-    import shapely
-
-    polygons = [shapely.Polygon(copy.cut_line) for copy in marker.placements]
-    for a, b in shapely.STRtree(polygons).query(polygons, predicate="intersects").T:
-        if a < b and polygons[a].intersection(polygons[b]).area > OVERLAP:
-            raise RuntimeError(f"the nesting overlaps: {marker.placements[a].label}, {marker.placements[b].label}")
-    for copy in marker.placements:
-        low, high = copy.cut_line.min(axis=0), copy.cut_line.max(axis=0)
-        if low.min() < -1e-6 or high[0] > marker.length + 1e-6 or high[1] > marker.width + 1e-6:
-            raise RuntimeError(f"the nesting puts {copy.label} beyond the cloth")
 
 
 def unfold_piece(piece: DraftedPiece) -> FloatArray:

@@ -77,15 +77,34 @@ def lay_by_rule(
     Raises:
         InputError: a seam to be matched does not exist, or a piece is too wide.
     """
+    import shapely
+
     stripes.check_seams(garment)
     repeat = stripes.repeat
     cell = np.where(repeat > 0.0, repeat / np.maximum(1, np.ceil(repeat / CELL)), CELL)
     phases = _phases(copies, _matched_points(copies, stripes.seams, garment))
     masks, lows = [], []
     for copy, phase in zip(copies, phases, strict=True):
-        mask, low = _mask(copy, np.where(repeat > 0.0, phase, np.nan), cell, gap)
-        masks.append(mask)
-        lows.append(low)
+        # The cells that a copy touches, grown by half of the gap, x in rows and y in columns; and where they begin in it [m].
+        outline = copy.outline @ copy.linear.T
+        corner = outline.min(axis=0)
+        # A bound copy begins as far into a cell as its phase says.
+        own = np.where(repeat > 0.0, phase, np.nan)
+        bound = np.mod(np.nan_to_num(own) + corner, cell)
+        bound += cell * np.maximum(0.0, np.ceil((0.5 * gap - bound) / cell - 1e-9))
+        into = np.where(np.isfinite(own), bound, 0.5 * gap)
+        if copy.at_fold:
+            into[1] = 0.0
+        grown = shapely.Polygon(outline - corner + into).buffer(0.5 * gap)
+        if copy.at_fold:
+            grown = grown.intersection(shapely.box(-1.0, 0.0, 100.0, 100.0))
+        high = np.array(grown.bounds[2:])
+        tall, wide = np.maximum(1, np.ceil(high / cell - 1e-9)).astype(int)
+        # Rows run downwards there.
+        turned = shapely.transform(grown, lambda points: points[:, ::-1] * [1.0, -1.0])
+        cells = touched_cells(turned, np.zeros(2), cell[::-1], (int(tall), int(wide)))
+        masks.append(Mask(cells=cells, quarters=0, extent=high))
+        lows.append(corner - into)
     across = int(np.floor(width / cell[1]))
     for copy, mask in zip(copies, masks, strict=True):
         if mask.cells.shape[1] > across:
@@ -165,28 +184,3 @@ def _phases(copies: Sequence[Laid], points: Sequence[Mapping[int, FloatArray]]) 
                         phases[k] = phases[here] + joined[here] - at
                         queue.append(k)
     return phases
-
-
-def _mask(copy: Laid, phase: FloatArray, cell: FloatArray, gap: float) -> tuple[Mask, FloatArray]:
-    """Return the cells that a copy touches, grown by half of the gap [m], x in rows and y in columns; and where they begin in it [m].
-
-    A bound copy begins as far into a cell as its phase [m] says.
-    """
-    import shapely
-
-    outline = copy.outline @ copy.linear.T
-    low = outline.min(axis=0)
-    bound = np.mod(np.nan_to_num(phase) + low, cell)
-    bound += cell * np.maximum(0.0, np.ceil((0.5 * gap - bound) / cell - 1e-9))
-    into = np.where(np.isfinite(phase), bound, 0.5 * gap)
-    if copy.at_fold:
-        into[1] = 0.0
-    grown = shapely.Polygon(outline - low + into).buffer(0.5 * gap)
-    if copy.at_fold:
-        grown = grown.intersection(shapely.box(-1.0, 0.0, 100.0, 100.0))
-    high = np.array(grown.bounds[2:])
-    tall, wide = np.maximum(1, np.ceil(high / cell - 1e-9)).astype(int)
-    # Rows run downwards there.
-    turned = shapely.transform(grown, lambda points: points[:, ::-1] * [1.0, -1.0])
-    cells = touched_cells(turned, np.zeros(2), cell[::-1], (int(tall), int(wide)))
-    return Mask(cells=cells, quarters=0, extent=high), low - into

@@ -41,12 +41,6 @@ def named_outline(
     Raises:
         InputError: the edges do not close, or a leg has no tip.
     """
-    edges = _chain_edges(parts, where)
-    return with_drawn_allowances(edges, cutting) if cutting else edges, _find_darts(edges, tips, legs, where)
-
-
-def _chain_edges(parts: Sequence[tuple[str, str, FloatArray]], where: str) -> list[Edge]:
-    """Return lines as the edges of one closed outline, counter-clockwise."""
     chain = [parts[0]]
     # The last end of each line stands before its first: of two that are as near, the line is turned.
     ends = np.array([points[[-1, 0]] for _, _, points in parts])
@@ -65,13 +59,27 @@ def _chain_edges(parts: Sequence[tuple[str, str, FloatArray]], where: str) -> li
     gap = float(np.linalg.norm(chain[-1][2][-1] - chain[0][2][0]))
     if gap > _SAME:
         raise InputError(f"{where}: the outline is open by {1e3 * gap:.1f} mm; its edges must close")
+    # The outline runs counter-clockwise.
     ring = np.concatenate([points[:-1] for _, _, points in chain])
     if signed_area(ring) < 0.0:
         chain = [(name, kind, points[::-1]) for name, kind, points in chain[::-1]]
     joined = [(name, kind, points.copy()) for name, kind, points in chain]
     for before, after in zip(joined, [*joined[1:], joined[0]], strict=True):
         after[2][0] = before[2][-1]
-    return [Edge(name=name, kind=kind, points=points) for name, kind, points in joined]
+    edges = [Edge(name=name, kind=kind, points=points) for name, kind, points in joined]
+    # Two legs that follow each other and meet at a tip are a dart.
+    darts = list[Dart]()
+    for left, right in zip(edges, [*edges[1:], *edges[:1]], strict=True):
+        if left.kind == right.kind == "dart":
+            names = [name for name, tip in tips.items() if np.linalg.norm(left.points[-1] - tip) < _SAME]
+            if names:
+                depth = _sewn_depth(left.points, legs)
+                darts.append(Dart(name=names[0], left=left.name, right=right.name, pleat=depth))
+    found = {leg for dart in darts for leg in (dart.left, dart.right)}
+    for edge in edges:
+        if edge.kind == "dart" and edge.name not in found:
+            raise InputError(f"{where}: leg {edge.name!r} has no dart; its name must stand at the tip")
+    return with_drawn_allowances(edges, cutting) if cutting else edges, darts
 
 
 def split_outline(ring: FloatArray, corners: FloatArray | None = None, fold: FloatArray | None = None) -> list[Edge]:
@@ -163,24 +171,6 @@ def boundary_edges(
         edge if edge.kind == "fold" else replace(edge, allowance=allowance or 0.0)
         for edge in split_outline(sewing, None if allowance else corners, fold)
     ]
-
-
-def _find_darts(
-    edges: Sequence[Edge], tips: Mapping[str, FloatArray], legs: Sequence[FloatArray], where: str
-) -> list[Dart]:
-    """Return the darts whose tips are known: two legs that follow each other and meet there."""
-    darts = []
-    for left, right in zip(edges, [*edges[1:], *edges[:1]], strict=True):
-        if left.kind == right.kind == "dart":
-            names = [name for name, tip in tips.items() if np.linalg.norm(left.points[-1] - tip) < _SAME]
-            if names:
-                depth = _sewn_depth(left.points, legs)
-                darts.append(Dart(name=names[0], left=left.name, right=right.name, pleat=depth))
-    found = {leg for dart in darts for leg in (dart.left, dart.right)}
-    for edge in edges:
-        if edge.kind == "dart" and edge.name not in found:
-            raise InputError(f"{where}: leg {edge.name!r} has no dart; its name must stand at the tip")
-    return darts
 
 
 def _sewn_depth(leg: FloatArray, lines: Sequence[FloatArray]) -> float | None:

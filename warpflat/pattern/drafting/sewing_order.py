@@ -7,7 +7,7 @@ closes a ring, panels of one side of the body before its halves, and these befor
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
@@ -18,7 +18,7 @@ import numpy as np
 from warpflat.core import other_side, unnumbered, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.measures import length_words
-from warpflat.pattern.drafting.pieces import Piece, Seam, SeamOpening, SeamSide
+from warpflat.pattern.drafting.pieces import Seam, SeamOpening, SeamSide
 from warpflat.pattern.drafting.polygons import signed_area, turn_between
 from warpflat.pattern.drafting.seam_words import joint_words
 from warpflat.pattern.drafting.sewing_tasks import GATHERED, Place, SewingTasks, Task, pieces_of, techniques
@@ -193,36 +193,7 @@ class _Workshop(SewingTasks):
 
     def __init__(self, garment: DraftedGarment, size: str) -> None:
         super().__init__(garment, size)
-        self._need()
-        ordered = self._sorted()
-        self.techniques = [technique for technique, _ in ordered]
-        self.lined = {piece for task in self.tasks if task.technique == "lined_edge" for piece, _ in task.sewn}
-        self.letters: dict[str, str] = {}
-        self.batches = [[(task, self._sewn(task)) for task in batch] for _, batch in ordered]
-
-    def _corner(self, side: SeamSide, *, end: bool) -> Corner:
-        order = self.order[side.piece]
-        at = order.index(side.edge) + (end != side.reversed)
-        return *side.cloth, at % len(order)
-
-    def _ends(self, seam: Seam) -> list[tuple[Corner, Corner]]:
-        """Return the corners that a seam joins at its start and at its end."""
-        first, second = seam.sides
-        return [
-            (self._corner(first[0], end=False), self._corner(second[0], end=False)),
-            (self._corner(first[-1], end=True), self._corner(second[-1], end=True)),
-        ]
-
-    def _joints(self, seam: Seam) -> list[frozenset[Corner]]:
-        """Return the pairs of corners that meet along a seam's line, the ends of a ring last, for both of its sides."""
-        found = []
-        for row in seam.sides:
-            pairs = [*pairwise(row), (row[-1], row[0])]
-            found += [frozenset((self._corner(a, end=True), self._corner(b, end=False))) for a, b in pairs]
-        return found
-
-    def _need(self) -> None:
-        """Let each task need the seams that end on its line."""
+        # Each task needs the seams that end on its line.
         ends: dict[frozenset[Corner], list[Task]] = {}
         beside: dict[Corner, list[tuple[Task, Corner]]] = {}
         for task in self.tasks:
@@ -232,8 +203,10 @@ class _Workshop(SewingTasks):
                     for corner, opposite in (pair, pair[::-1]):
                         beside.setdefault(corner, []).append((task, opposite))
         for task in self.tasks:
-            for seam in task.seams:
-                for joint in self._joints(seam):
+            for chain in (chain for seam in task.seams for chain in seam.sides):
+                # The ends of a ring meet, too.
+                for before, after in (*pairwise(chain), (chain[-1], chain[0])):
+                    joint = frozenset((self._corner(before, end=True), self._corner(after, end=False)))
                     task.needs.update(ends.get(joint, ()))
         for met, crossing in ends.items():
             corners = list(met)
@@ -263,11 +236,29 @@ class _Workshop(SewingTasks):
             if task.how["turn"] < 40 or task.seams:
                 continue
             reached = {(p, (self.order[p].index(e) + k) % len(self.order[p])) for p, e in task.uses for k in (0, 1)}
-            for joint, crossing in ends.items():
-                if all((corner[0], corner[3]) in reached for corner in joint):
+            for met, crossing in ends.items():
+                if all((corner[0], corner[3]) in reached for corner in met):
                     task.needs.update(crossing)
         for task in self.tasks:
             task.needs.discard(task)
+        ordered = self._sorted()
+        self.techniques = [technique for technique, _ in ordered]
+        self.lined = {piece for task in self.tasks if task.technique == "lined_edge" for piece, _ in task.sewn}
+        self.letters: dict[str, str] = {}
+        self.batches = [[(task, self._sewn(task)) for task in batch] for _, batch in ordered]
+
+    def _corner(self, side: SeamSide, *, end: bool) -> Corner:
+        order = self.order[side.piece]
+        at = order.index(side.edge) + (end != side.reversed)
+        return *side.cloth, at % len(order)
+
+    def _ends(self, seam: Seam) -> list[tuple[Corner, Corner]]:
+        """Return the corners that a seam joins at its start and at its end."""
+        first, second = seam.sides
+        return [
+            (self._corner(first[0], end=False), self._corner(second[0], end=False)),
+            (self._corner(first[-1], end=True), self._corner(second[-1], end=True)),
+        ]
 
     def _alike(self, first: Corner, second: Corner, third: Corner) -> bool:
         """Return whether two corners that meet are more alike in their angles than either is to a third, by 10 degrees at least."""
@@ -400,7 +391,10 @@ class _Workshop(SewingTasks):
         if abs(seam.ease) >= 5e-4 and not any(piece.pleats for piece in joined):
             share = seam.ease if seam.ease > 0 else 1.0 / (1.0 + seam.ease) - 1.0
             band = pieces[seam.sides[0 if seam.ease > 0 else 1][0].piece]
-            stretched = band.role == "strip" or (share < _STRETCHED and self._is_ring(band))
+            # A ring is a slender strip whose ends are sewn to each other.
+            slender = (sum(edge.length for edge in band.edges) / 2.0) ** 2 > _SLENDER * signed_area(band.outline)
+            ring = slender and any({side.piece for side in each.stretches} == {band.name} for each in self.seams)
+            stretched = band.role == "strip" or (share < _STRETCHED and ring)
             held = "stretch" if stretched else "gather" if share > GATHERED else "ease in"
         new = letters_of(len(set(self.letters.values())))
         letter = new if task.like is None else self.letters[task.like.seams[0].name]
@@ -411,7 +405,15 @@ class _Workshop(SewingTasks):
         copied = any(part.copy for each in group for part in each.stretches)
         equal = copied and len({part.piece for each in group for part in each.stretches}) > 2
         by_pieces = by_pieces or equal
-        first, second = (self._words([each.sides[k] for each in (group if equal else group[:1])]) for k in (0, 1))
+        titles = list[str]()
+        for k in (0, 1):
+            # The pieces of each row once: those in a row are sewn to each other before.
+            found: dict[frozenset[str], str] = {}
+            for each in group if equal else group[:1]:
+                row = dict.fromkeys(self.titles[part.piece] for part in each.sides[k])
+                found.setdefault(frozenset(row), " + ".join(row))
+            titles.append(", ".join(found.values()))
+        first, second = titles
         if not by_pieces:
             name = translate_name(without_side(seam.name) if sideless else seam.name)
         else:
@@ -432,17 +434,3 @@ class _Workshop(SewingTasks):
                 places=tuple(places),
             )
         ]
-
-    def _is_ring(self, piece: Piece) -> bool:
-        """Return whether a piece is a slender strip whose ends are sewn to each other."""
-        lengths = [edge.length for edge in piece.edges]
-        slender = (sum(lengths) / 2.0) ** 2 > _SLENDER * signed_area(piece.outline)
-        return slender and any({side.piece for side in each.stretches} == {piece.name} for each in self.seams)
-
-    def _words(self, rows: Iterable[Sequence[SeamSide]]) -> str:
-        """Return the pieces of each row once: those in a row are sewn to each other before."""
-        found: dict[frozenset[str], str] = {}
-        for row in rows:
-            titles = dict.fromkeys(self.titles[part.piece] for part in row)
-            found.setdefault(frozenset(titles), " + ".join(titles))
-        return ", ".join(found.values())

@@ -102,9 +102,44 @@ class SewingTasks:
         self.above = "right" if garment.garment.worn is None else garment.garment.worn.buttonholes
         self.order = {name: [edge.name for edge in piece.edges] for name, piece in self.pieces.items()}
         self.lengths = {report.name: report.length_mm for report in garment.seams if report.size == size}
-        self.tasks = [
-            Task(technique=self._technique(group), seams=group) for group in _mirror_groups(self.seams, self.pieces)
-        ]
+        # Seams that are each other's mirror images are sewn alike.
+        groups: dict[object, list[Seam]] = {}
+        copied = {s.place for seam in self.seams for s in seam.stretches if s.copy}
+        alike: dict[tuple[str, str], object] = {}
+        images: dict[object, object] = {}
+        for seam in self.seams:
+            # Edges of equal pieces, of which one is drawn, have the notches of one seam.
+            key: object
+            own = [s.place for s in seam.stretches if s.place in copied]
+            if own:
+                key = next((alike[edge] for edge in own if edge in alike), own[0])
+                alike |= dict.fromkeys(own, key)
+                groups.setdefault(key, []).append(seam)
+                continue
+            sides = sorted(
+                tuple(sorted((without_side(s.piece), line_name(s.edge)) for s in side)) for side in seam.sides
+            )
+            # A zip in one side alone makes it another seam than the other side. Parts of an edge are numbered around the piece.
+            key = without_side(seam.name), tuple(sides), seam.openings
+            if any(self.pieces[side.piece].is_pair for side in seam.stretches):
+                # Whatever its name, the seam of the copies that are turned over is the mirror image, at the other sides of other pieces.
+                image = [
+                    [
+                        replace(side, mirrored=not side.mirrored)
+                        if self.pieces[side.piece].is_pair
+                        else replace(side, edge=other_side(side.edge))
+                        for side in row
+                    ]
+                    for row in seam.sides
+                ]
+                here, there = (
+                    frozenset(frozenset((side.place, side.mirrored) for side in row) for row in rows)
+                    for rows in (seam.sides, image)
+                )
+                key = images.setdefault((here, seam.openings), key)
+                images[there, seam.openings] = key
+            groups.setdefault(key, []).append(seam)
+        self.tasks = [Task(technique=self._technique(group), seams=group) for group in groups.values()]
         # A zip lies in one of two sides. Of halves on the fold the seam of one side stands for both.
         for task in [task for task in self.tasks if task.seams[0].openings]:
             name = other_side(task.seams[0].name)
@@ -153,14 +188,14 @@ class SewingTasks:
                 row += f" {name}"
             rows.setdefault(row, []).append((piece, edge))
         if technique == "bind_raw":
-            counts = {row: sum(self._length(place) for place in places) for row, places in rows.items()}
-            return ", ".join(f"{row} {length_words(length, self.units)}" for row, length in counts.items())
+            told = []
+            for row, own in rows.items():
+                edges = [(self.pieces[piece], edge) for piece, edge in own]
+                # On all that is cut by a piece.
+                length = sum(p.edge(edge).length * p.quantity * (2 if p.on_fold else 1) for p, edge in edges)
+                told.append(f"{row} {length_words(length, self.units)}")
+            return ", ".join(told)
         return ", ".join(f"{row} ({self.called(pieces_of(places))})" for row, places in rows.items())
-
-    def _length(self, place: Place) -> float:
-        """Return the length of an edge on all that is cut by its piece [m]."""
-        piece = self.pieces[place[0]]
-        return piece.edge(place[1]).length * piece.quantity * (2 if piece.on_fold else 1)
 
     def _technique(self, group: Sequence[Seam]) -> str:
         """Return how seams are sewn, by the roles of their pieces and by what these are like; "" for seams of the shell."""
@@ -183,7 +218,12 @@ class SewingTasks:
             ring = any({side.piece for side in each.stretches} == {strips[0].name} for each in self.seams)
             return "waistband_ring" if ring else "waistband_ends"
         if technique == "collar":
-            falls = [each for each in self.seams if self._is_fall(each)]
+            # The seams that join the fall of a collar to its stand.
+            falls = list[Seam]()
+            for each in self.seams:
+                sides = [row[0] for row in each.sides]
+                if all(self._role(side) == "collar" for side in sides) and sides[0].piece != sides[1].piece:
+                    falls.append(each)
             stands = {side.piece for each in falls for side in each.sides[1]}
             return "stand_and_fall" if seam in falls or joined[0].name in stands else "collar"
         if technique == "collar_on":
@@ -209,11 +249,6 @@ class SewingTasks:
     def _role(self, side: SeamSide) -> str:
         role = self.pieces[side.piece].role
         return "facing" if role == "shell" and side.edge.startswith(_GROWN_ON) else role
-
-    def _is_fall(self, seam: Seam) -> bool:
-        """Return whether a seam joins the fall of a collar to its stand."""
-        sides = [row[0] for row in seam.sides]
-        return all(self._role(side) == "collar" for side in sides) and sides[0].piece != sides[1].piece
 
     def _grown_on(self, piece: str) -> list[str]:
         """Return the edges of a facing that is grown on to a piece of the shell."""
@@ -280,11 +315,50 @@ class SewingTasks:
             if edge.kind not in ("fold", "dart") and not edge.as_drawn and (piece.name, edge.name) not in sewn
         }
         self._finish_parts({piece for piece, _ in sewn})
-        self._finish_grown_facings()
-        self._finish_inner_edges()
+        # A facing that is grown on, beside a collar that ends at the centre, is sewn with that.
+        between = [task for task in self.tasks if task.technique == "collar_between"]
+        for name in [name for name in self.pieces if self._grown_on(name)]:
+            own = [(name, edge) for edge in (*self._grown_on(name), *self._free_beside_fold(name))]
+            faced = [each for each in self.tasks if each.technique == "facing" and set(own) & set(each.sewn)]
+            places = self._take([(p, e) for p, e in own if not faced or self.pieces[p].edge(e).kind != "hem"])
+            if faced:
+                faced[0].uses += places
+            elif between:
+                between[0].uses += places
+                between[0].pieces.append(name)
+            else:
+                self._add("grown_facing", [name], places)
+        for task in self.tasks:
+            if task.technique == "collar_under_facing":
+                task.uses += self._take(self._turned_over(task.seams[0]))
+        # Where linings and facings end at a zip, or are caught in a band or binding, the shell has an edge of the same name.
+        zipped, bound = set[str](), set[str]()
+        for task in self.tasks:
+            edges = {without_side(edge) for piece, edge in task.sewn if self.pieces[piece].role == "shell"}
+            zipped |= edges if any(opening.kind == "zip" for seam in task.seams for opening in seam.openings) else set()
+            bound |= edges if task.how.get("takes_edges") and task.technique not in ("facing", "hood") else set()
+        inner = self._with_role("lining", "facing")
+        for technique, known in (("at_zip", zipped), ("baste_lining", bound)):
+            free = [(p, e) for (p, e), kind in self._free.items() if p in inner and kind == "seam"]
+            self._add(technique, [], self._take([(p, e) for p, e in free if without_side(e) in known]))
+        linings = [task for task in self.tasks if task.technique == "lining_join"]
+        zips = [task for task in linings if any(each.kind == "zip" for each in task.seams[0].openings)]
+        for task in self.tasks:
+            if task.technique == "at_zip":
+                task.places = [place for each in zips for place in each.sewn]
         self._finish_strips()
+        # Vents and slits, in the shell and in its lining.
+        role = {name: piece.role for name, piece in self.pieces.items()}
         for kind in ("vent", "slit"):
-            self._finish_opening(kind)
+            own = [place for place in self._free if self._free[place] == "hem" and kind in place[1].split(" ")]
+            for task in [task for task in self.tasks if task.seams]:
+                found, sides = [each for each in task.seams[0].openings if each.kind == kind], task.sewn
+                if found and role[sides[0][0]] != "lining":
+                    places = self._take([(p, e) for p, e in own if (p, e.removesuffix(f" {kind}")) in sides])
+                    values = {"length": length_words(found[0].length, self.units), "of": task.seams}
+                    self.tasks.append(Task(technique=kind, uses=places, values=values, needs={task}))
+            lined = self._take([place for place in own if place in self._free and role[place[0]] == "lining"])
+            self._add("lined_opening", [], lined, kind=translate(kind))
         for elastic in elastics:
             self._thread(elastic)
         shell = self._with_role("shell")
@@ -303,7 +377,13 @@ class SewingTasks:
         self._add("tie_on", tied)
         for technique in ("dart", "pleat"):
             for piece in self.drafted.values():
-                legs = _dart_legs(piece, pleats=technique == "pleat")
+                # The edges of its darts, or of its pleats, by the names that are printed; a fisheye dart is its own line.
+                legs = dict[str, list[str]]()
+                pleats = technique == "pleat"
+                for dart in (each.dart for each in piece.darts if (each.dart.pleat is not None) == pleats):
+                    legs.setdefault(translate_name(without_side(dart.name)), []).extend([dart.left, dart.right])
+                for name in () if pleats else piece.fisheyes:
+                    legs.setdefault(translate_name(without_side(name)), []).append(name)
                 if legs:
                     self._add(technique, [piece.name], darts=f"{self.titles[piece.name]}: {listed(list(legs))}")
                     self.tasks[-1].places = [(piece.name, leg) for row in legs.values() for leg in row]
@@ -334,41 +414,6 @@ class SewingTasks:
             if task.technique == "fly":
                 task.pieces, task.uses = fly, places
 
-    def _finish_grown_facings(self) -> None:
-        """Add facings that are grown on; beside a collar that ends at the centre they are sewn with that."""
-        between = [task for task in self.tasks if task.technique == "collar_between"]
-        for name in [name for name in self.pieces if self._grown_on(name)]:
-            own = [(name, edge) for edge in (*self._grown_on(name), *self._free_beside_fold(name))]
-            faced = [each for each in self.tasks if each.technique == "facing" and set(own) & set(each.sewn)]
-            places = self._take([(p, e) for p, e in own if not faced or self.pieces[p].edge(e).kind != "hem"])
-            if faced:
-                faced[0].uses += places
-            elif between:
-                between[0].uses += places
-                between[0].pieces.append(name)
-            else:
-                self._add("grown_facing", [name], places)
-        for task in self.tasks:
-            if task.technique == "collar_under_facing":
-                task.uses += self._take(self._turned_over(task.seams[0]))
-
-    def _finish_inner_edges(self) -> None:
-        """Add where linings and facings end at a zip, or are caught in a band or binding: there the shell has an edge of the same name."""
-        zipped, bound = set[str](), set[str]()
-        for task in self.tasks:
-            edges = {without_side(edge) for piece, edge in task.sewn if self.pieces[piece].role == "shell"}
-            zipped |= edges if any(opening.kind == "zip" for seam in task.seams for opening in seam.openings) else set()
-            bound |= edges if task.how.get("takes_edges") and task.technique not in ("facing", "hood") else set()
-        inner = self._with_role("lining", "facing")
-        for technique, known in (("at_zip", zipped), ("baste_lining", bound)):
-            free = [(p, e) for (p, e), kind in self._free.items() if p in inner and kind == "seam"]
-            self._add(technique, [], self._take([(p, e) for p, e in free if without_side(e) in known]))
-        linings = [task for task in self.tasks if task.technique == "lining_join"]
-        zips = [task for task in linings if any(each.kind == "zip" for each in task.seams[0].openings)]
-        for task in self.tasks:
-            if task.technique == "at_zip":
-                task.places = [place for each in zips for place in each.sewn]
-
     def _finish_strips(self) -> None:
         """Add ruffles and hems of hoods; what their own seam to the garment leaves of strips, collars and facings goes with that."""
         ruffles = [name for name in self._with_role("strip") if self._has_hem(name)]
@@ -385,19 +430,6 @@ class SewingTasks:
             on = [t for t in self.tasks if t.how.get("takes_edges") and name in pieces_of(t.sewn)]
             if on and places:
                 max(on, key=lambda task: int(task.how["turn"])).uses.extend(self._take(places))
-
-    def _finish_opening(self, kind: str) -> None:
-        """Add vents or slits, in the shell and in its lining."""
-        role = {name: piece.role for name, piece in self.pieces.items()}
-        own = [place for place in self._free if self._free[place] == "hem" and kind in place[1].split(" ")]
-        for task in [task for task in self.tasks if task.seams]:
-            found, sides = [each for each in task.seams[0].openings if each.kind == kind], task.sewn
-            if found and role[sides[0][0]] != "lining":
-                places = self._take([(p, e) for p, e in own if (p, e.removesuffix(f" {kind}")) in sides])
-                values = {"length": length_words(found[0].length, self.units), "of": task.seams}
-                self.tasks.append(Task(technique=kind, uses=places, values=values, needs={task}))
-        lined = self._take([place for place in own if place in self._free and role[place[0]] == "lining"])
-        self._add("lined_opening", [], lined, kind=translate(kind))
 
     def _thread(self, elastic: Elastic) -> None:
         """Add an elastic, in a casing or a folded band, with its notion."""
@@ -484,42 +516,6 @@ def is_flounce(piece: Piece) -> bool:
     return "flounce" in re.split("[ _]", piece.name)
 
 
-def _mirror_groups(seams: Sequence[Seam], pieces: Mapping[str, Piece]) -> list[list[Seam]]:
-    """Return seams that are each other's mirror images together, which are sewn alike."""
-    groups: dict[object, list[Seam]] = {}
-    copied = {s.place for seam in seams for s in seam.stretches if s.copy}
-    alike: dict[tuple[str, str], object] = {}
-    images: dict[object, object] = {}
-    for seam in seams:
-        # Edges of equal pieces, of which one is drawn, have the notches of one seam.
-        key: object
-        own = [s.place for s in seam.stretches if s.place in copied]
-        if own:
-            key = next((alike[edge] for edge in own if edge in alike), own[0])
-            alike |= dict.fromkeys(own, key)
-            groups.setdefault(key, []).append(seam)
-            continue
-        sides = sorted(tuple(sorted((without_side(s.piece), line_name(s.edge)) for s in side)) for side in seam.sides)
-        # A zip in one side alone makes it another seam than the other side. Parts of an edge are numbered around the piece.
-        key = without_side(seam.name), tuple(sides), seam.openings
-        if any(pieces[side.piece].is_pair for side in seam.stretches):
-            # Whatever its name, the seam of the copies that are turned over is the mirror image, at the other sides of other pieces.
-            image = [[_mirror_image(side, pieces[side.piece]) for side in row] for row in seam.sides]
-            here, there = (
-                frozenset(frozenset((side.place, side.mirrored) for side in row) for row in rows)
-                for rows in (seam.sides, image)
-            )
-            key = images.setdefault((here, seam.openings), key)
-            images[there, seam.openings] = key
-        groups.setdefault(key, []).append(seam)
-    return list(groups.values())
-
-
-def _mirror_image(side: SeamSide, piece: Piece) -> SeamSide:
-    """Return the stretch of the mirrored seam: of a pair the copy that is turned over, else the edge of the other side."""
-    return replace(side, mirrored=not side.mirrored) if piece.is_pair else replace(side, edge=other_side(side.edge))
-
-
 def _buttons_at_one_end(piece: DraftedPiece) -> bool:
     """Return whether a strip buttons upon itself: a cuff, or the stand of a collar."""
     return piece.piece.role in ("cuff", "collar", "waistband") and "button" in piece.piece.marks
@@ -527,14 +523,3 @@ def _buttons_at_one_end(piece: DraftedPiece) -> bool:
 
 def pieces_of(places: Iterable[Place]) -> list[str]:
     return list(dict.fromkeys(piece for piece, _ in places))
-
-
-def _dart_legs(piece: DraftedPiece, *, pleats: bool) -> dict[str, list[str]]:
-    """Return the edges of a piece's darts, or of its pleats, by the names that are printed; a fisheye dart is its own line."""
-    legs: dict[str, list[str]] = {}
-    for dart in (each.dart for each in piece.darts):
-        if (dart.pleat is not None) == pleats:
-            legs.setdefault(translate_name(without_side(dart.name)), []).extend([dart.left, dart.right])
-    for name in () if pleats else piece.fisheyes:
-        legs.setdefault(translate_name(without_side(name)), []).append(name)
-    return legs

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from warpflat.core import FloatArray, arc_lengths, atomic_path, points_at_lengths, turning_angles
 from warpflat.pattern.drafting.curves import CHORD, TOLERANCE, cubic_weights
-from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
+from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.fitting import EdgeKey
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.drafting.whole_pieces import whole_pieces
@@ -64,7 +64,22 @@ def garmentcode_json(garment: DraftedGarment, *, size: str | None = None) -> tup
         for what, names in (("holes", [*piece.cutouts, *piece.fisheyes]), ("lines inside", piece.internal_lines))
         if names
     ]
-    pieces, seams, _ = whole_pieces(map(_drawn, garment.pieces[chosen]), garment.garment.seams, unsewn=True)
+    # Pieces are along their drawn lines, in their plane, without what GarmentCode does not know.
+    drawn = list[Piece]()
+    for drafted in garment.pieces[chosen]:
+        own, frame = drafted.piece, np.vstack([drafted.frame, [0.0, 0.0, 1.0]])
+        drawn.append(
+            replace(
+                own,
+                edges=[replace(edge.edge, points=edge.line, vertices=None) for edge in drafted.edges],
+                holes=(),
+                internal_lines={},
+                marks={},
+                grain=drafted.grain,
+                placement=None if own.placement is None else own.placement @ np.linalg.inv(frame),
+            )
+        )
+    pieces, seams, _ = whole_pieces(drawn, garment.garment.seams, unsewn=True)
     lines = {(name, edge.name): edge.points for name, piece in pieces.items() for edge in piece.edges}
     stitched, splits, notes = _stitched(pieces, seams, lines)
     left_out += notes
@@ -106,20 +121,6 @@ def garmentcode_json(garment: DraftedGarment, *, size: str | None = None) -> tup
         "units_in_meter": int(CENTIMETRES),
     }
     return {"pattern": pattern, "parameters": {}, "parameter_order": [], "properties": properties}, tuple(left_out)
-
-
-def _drawn(drafted: DraftedPiece) -> Piece:
-    """Return a piece along its drawn lines, in their plane, without what GarmentCode does not know."""
-    own, frame = drafted.piece, np.vstack([drafted.frame, [0.0, 0.0, 1.0]])
-    return replace(
-        own,
-        edges=[replace(edge.edge, points=edge.line, vertices=None) for edge in drafted.edges],
-        holes=(),
-        internal_lines={},
-        marks={},
-        grain=drafted.grain,
-        placement=None if own.placement is None else own.placement @ np.linalg.inv(frame),
-    )
 
 
 def _stitched(

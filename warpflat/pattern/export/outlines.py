@@ -254,7 +254,11 @@ def find_outlines(
     if len(rings) < len(found.rings):
         notes.append(f"left out as too small for pieces: {format_count(len(found.rings) - len(rings), 'closed line')}")
     if page is not None and len(rings) > 1:
-        frames = [k for k, ring in enumerate(rings) if _is_frame(ring.points, page)]
+        for k, ring in enumerate(rings):
+            polygon, sides = shapely.Polygon(ring.points), np.ptp(ring.points, axis=0)
+            full = polygon.is_valid and polygon.area >= (1.0 - 0.01 * _FRAME) * sides.prod()
+            if full and (np.abs(sides / page - 1.0) <= _FRAME).all():
+                frames.append(k)
         frames = frames if len(frames) < len(rings) else []
         names = [quote_value(rings[k].name) if rings[k].name else "a closed line" for k in frames]
         notes += [f"{name} has the page's size and was taken for its frame" for name in names]
@@ -322,12 +326,3 @@ def _largest_first(rings: Sequence[DrawnLine]) -> list[DrawnLine]:
     import shapely
 
     return sorted(rings, key=lambda ring: -shapely.Polygon(ring.points).convex_hull.area)
-
-
-def _is_frame(points: FloatArray, page: tuple[float, float]) -> bool:
-    """Return whether a closed line is a rectangle of the page's size."""
-    import shapely
-
-    polygon, sides = shapely.Polygon(points), np.ptp(points, axis=0)
-    full = polygon.is_valid and polygon.area >= (1.0 - 0.01 * _FRAME) * sides.prod()
-    return bool(full and (np.abs(sides / page - 1.0) <= _FRAME).all())

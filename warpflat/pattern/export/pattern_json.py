@@ -493,7 +493,12 @@ def pattern_from_json(data: Any) -> DraftedGarment:
             for size, pieces in data.sizes.items()
         }
         pieces = {size: tuple(piece.piece for piece in row) for size, row in drafted.items()}
-        seams = [_read_stitch(stitch) for stitch in data.stitches if stitch.kind == "seam"]
+        seams = list[Seam]()
+        for stitch in (stitch for stitch in data.stitches if stitch.kind == "seam"):
+            first, second = (
+                tuple(_made(SeamSide, side, copy=side.copy_number) for side in row) for row in stitch.sides
+            )
+            seams.append(_made(Seam, stitch, sides=(first, second)))
         reports = tuple(_made(SeamReport, report) for report in data.seams)
         garment = _made(Pattern, data, pieces=pieces, seams=seams)
         return DraftedGarment(garment=garment, pieces=drafted, seams=reports)
@@ -528,11 +533,6 @@ def _typed(hint: Any, value: Any) -> Any:
         return np.array(value)
     rows = [_typed(get_args(hint)[0], each) for each in value]
     return tuple(rows) if get_origin(hint) is tuple else rows
-
-
-def _read_stitch(stitch: StitchEntry) -> Seam:
-    first, second = (tuple(_made(SeamSide, side, copy=side.copy_number) for side in row) for row in stitch.sides)
-    return _made(Seam, stitch, sides=(first, second))
 
 
 def _read_piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:

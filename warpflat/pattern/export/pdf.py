@@ -115,7 +115,35 @@ def draw_sheet(printed: DraftedGarment, paper: str) -> tuple[Tiling, list[tuple[
     """
     import shapely
 
-    sheet, tiling = _arranged(nests(printed), PAPERS[paper])
+    # A layout that needs few pages.
+    groups, kind = nests(printed), PAPERS[paper]
+    if kind.tiled:
+        # Pieces, turned where that helps, on the tiles of a grid, of which they take few.
+        shapes = []
+        for group in groups:
+            rings = covered_rings(group)
+            shape = shapely.union_all([shapely.Polygon(ring) for ring in rings])
+            # A label beside its piece belongs to it, with all between.
+            shapes.append(shape if len(rings) == len(group) else shape.convex_hull)
+        placed = list[Placed]()
+        turned, size = nest_on_tiles(shapes, step=kind.step, overlap=kind.overlap, gap=0.004)
+        for group, shape, laid in zip(groups, shapes, turned, strict=True):
+            quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
+            turn = np.linalg.matrix_power(quarter, laid.quarters)
+            low = (shapely.get_coordinates(shape) @ turn.T).min(axis=0)
+            placed.append(Placed(pieces=group, matrix=np.column_stack([turn, laid.corner - low])))
+        sheet = Sheet(placed=tuple(placed), size=size)
+    elif kind.endless:
+        widest = max(float(np.ptp(np.concatenate(covered_rings(group))[:, 0])) for group in groups)
+        sheet = lay_out(groups, width=max(PROJECTED_WIDTH, widest + 0.05), gap=0.016, reserved=LEGEND_SIZE)
+        wide, high = sheet.size + 2 * kind.margin + kind.overlap
+        kind = replace(kind, width=float(wide), height=float(high))
+    elif (packed := _on_pages(groups, kind)) is not None:
+        sheet = packed
+    else:  # a piece is larger than the paper
+        width = kind.step[0] + kind.overlap
+        sheet = lay_out(groups, width=width, gap=0.016, page_height=float(kind.step[1]), reserved=LEGEND_SIZE)
+    tiling = make_tiling(sheet, kind)
     # Labels move to where no joint of two sheets crosses them, where there is room for that.
     placed = []
     for place in sheet.placed:
@@ -126,7 +154,14 @@ def draw_sheet(printed: DraftedGarment, paper: str) -> tuple[Tiling, list[tuple[
             if joints and all(piece.label.leader is not None for piece in pieces):
                 others = [each for each in sheet.placed if each is not place]
                 pieces = _beside_on_one_sheet(place, others, tiling)
-        placed.append(replace(place, pieces=tuple(_upright(piece, place.matrix) for piece in pieces)))
+        upwards = []
+        for piece in pieces:
+            # A label that would stand on its head on the sheet is turned round.
+            angle = float(np.degrees(piece.label.angle + np.arctan2(place.matrix[1, 0], place.matrix[0, 0])))
+            if not -89.5 < (angle + 180.0) % 360.0 - 180.0 < 90.5:
+                piece = replace(piece, label=replace(piece.label, angle=piece.label.angle + np.pi))
+            upwards.append(piece)
+        placed.append(replace(place, pieces=tuple(upwards)))
     tiling, letters = replace(tiling, sheet=replace(sheet, placed=tuple(placed))), seam_letters(printed)
     sewn: dict[tuple[str, str], list[str]] = {}
     for seam in printed.garment.seams:
@@ -205,6 +240,7 @@ def _pages(
     """
     from reportlab import rl_config
     from reportlab.pdfbase import pdfmetrics
+    from reportlab.pdfbase.pdfdoc import PDFArray, PDFDictionary, PDFName, PDFResourceDictionary, PDFString, xObjectName
     from reportlab.pdfgen.canvas import Canvas
 
     kind, stream, chosen = tiling.paper, BytesIO(), tuple(whole.pieces)
@@ -247,7 +283,21 @@ def _pages(
         page_footer(canvas, whole.name, kind, translate("sheet {name}", name=title))
         canvas.showPage()
     if len(chosen) > 1:
-        _list_layers(canvas, chosen, ["sheet", *forms.values()])
+        # Layers, one a size, are optional content that readers list and can hide.
+        document = canvas._doc
+        groups = {
+            f"size{k}": document.Reference(PDFDictionary({"Type": PDFName("OCG"), "Name": PDFString(f"Size {size}")}))
+            for k, size in enumerate(chosen)
+        }
+        for name in ("sheet", *forms.values()):
+            form = document.idToObject[xObjectName(name)]
+            form.Resources = PDFResourceDictionary(Properties=groups)
+            form.Resources.basicFonts()
+        order, catalog = PDFArray(list(groups.values())), document.Catalog
+        catalog.OCProperties = PDFDictionary(
+            {"OCGs": order, "D": PDFDictionary({"Order": order, "ON": order, "Name": PDFString("Sizes")})}
+        )
+        catalog.__NoDefault__ = [*catalog.__NoDefault__, "OCProperties"]
     canvas.save()
     return stream.getvalue()
 
@@ -280,26 +330,6 @@ def _sheet_form(
     if sheet.reserved is not None:
         draw_legend(canvas, sheet.reserved, printed, chosen, tiling.paper.name)
     canvas.endForm()
-
-
-def _list_layers(canvas: Any, sizes: Sequence[str], forms: Sequence[str]) -> None:
-    """Make the layers of forms, one a size, optional content that readers list and can hide."""
-    from reportlab.pdfbase.pdfdoc import PDFArray, PDFDictionary, PDFName, PDFResourceDictionary, PDFString, xObjectName
-
-    document = canvas._doc
-    groups = {
-        f"size{k}": document.Reference(PDFDictionary({"Type": PDFName("OCG"), "Name": PDFString(f"Size {size}")}))
-        for k, size in enumerate(sizes)
-    }
-    for name in forms:
-        form = document.idToObject[xObjectName(name)]
-        form.Resources = PDFResourceDictionary(Properties=groups)
-        form.Resources.basicFonts()
-    order, catalog = PDFArray(list(groups.values())), document.Catalog
-    catalog.OCProperties = PDFDictionary(
-        {"OCGs": order, "D": PDFDictionary({"Order": order, "ON": order, "Name": PDFString("Sizes")})}
-    )
-    catalog.__NoDefault__ = [*catalog.__NoDefault__, "OCProperties"]
 
 
 def _word_forms(
@@ -365,42 +395,6 @@ def sheet_names(tiling: Tiling, drawings: Sequence[tuple[Drawing, ...]]) -> dict
     return found
 
 
-def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[Sheet, Tiling]:
-    """Return a layout that needs few pages."""
-    import shapely
-
-    if paper.tiled:
-        # Pieces, turned where that helps, on the tiles of a grid, of which they take few.
-        shapes = []
-        for group in groups:
-            rings = covered_rings(group)
-            shape = shapely.union_all([shapely.Polygon(ring) for ring in rings])
-            # A label beside its piece belongs to it, with all between.
-            shapes.append(shape if len(rings) == len(group) else shape.convex_hull)
-        places, size = nest_on_tiles(shapes, step=paper.step, overlap=paper.overlap, gap=0.004)
-        placed = []
-        for group, shape, place in zip(groups, shapes, places, strict=True):
-            quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
-            turn = np.linalg.matrix_power(quarter, place.quarters)
-            low = (shapely.get_coordinates(shape) @ turn.T).min(axis=0)
-            placed.append(Placed(pieces=group, matrix=np.column_stack([turn, place.corner - low])))
-        sheet = Sheet(placed=tuple(placed), size=size)
-        return sheet, make_tiling(sheet, paper)
-    if paper.endless:
-        widest = max(float(np.ptp(np.concatenate(covered_rings(group))[:, 0])) for group in groups)
-        sheet = lay_out(groups, width=max(PROJECTED_WIDTH, widest + 0.05), gap=0.016, reserved=LEGEND_SIZE)
-        width, height = sheet.size + 2 * paper.margin + paper.overlap
-        paper = replace(paper, width=float(width), height=float(height))
-        return sheet, make_tiling(sheet, paper)
-    packed = _on_pages(groups, paper)
-    if packed is not None:
-        sheet = packed
-    else:  # a piece is larger than the paper
-        width = paper.step[0] + paper.overlap
-        sheet = lay_out(groups, width=width, gap=0.016, page_height=float(paper.step[1]), reserved=LEGEND_SIZE)
-    return sheet, make_tiling(sheet, paper)
-
-
 def _on_pages(groups: Sequence[tuple[DraftedPiece, ...]], paper: Paper) -> Sheet | None:
     """Lay pieces and the legend on few pages, the largest first: each where its box lies clear of the pieces that are there.
 
@@ -456,14 +450,6 @@ def _on_pages(groups: Sequence[tuple[DraftedPiece, ...]], paper: Paper) -> Sheet
         matrix = np.column_stack([turns[number], corners_on_sheet[number] - boxes[number][0]])
         placed.append(Placed(pieces=tuple(group), matrix=matrix))
     return Sheet(placed=tuple(placed), size=size, reserved=corners_on_sheet[legend])
-
-
-def _upright(piece: DraftedPiece, matrix: FloatArray) -> DraftedPiece:
-    """Return a piece whose label is turned round where it would stand on its head on the sheet."""
-    turn = float(np.degrees(piece.label.angle + np.arctan2(matrix[1, 0], matrix[0, 0])))
-    if -89.5 < (turn + 180.0) % 360.0 - 180.0 < 90.5:
-        return piece
-    return replace(piece, label=replace(piece.label, angle=piece.label.angle + np.pi))
 
 
 def _stroke(canvas: Any, stroke: Stroke, matrix: FloatArray, size_index: int | None, widen: float = 1.0) -> None:

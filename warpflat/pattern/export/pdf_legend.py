@@ -85,6 +85,8 @@ def draw_legend(canvas: Any, at: FloatArray, garment: DraftedGarment, sizes: Seq
 
 def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], sheet: Sheet, tiling: Tiling) -> None:
     """Draw the first page of a tiled pattern, and end the page."""
+    import shapely
+
     paper = tiling.paper
     low = np.array([paper.margin + 0.005, paper.height - paper.margin - LEGEND_SIZE[1] - 0.002])
     draw_legend(canvas, low, garment, sizes, paper.name)
@@ -122,35 +124,26 @@ def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], shee
         canvas.drawString(*(name_at * POINT), tiling.name(row, column))
     canvas.setStrokeColor("#000000")
     canvas.setLineWidth(0.6)
+    names = piece_titles([p.pieces[0].piece for p in sheet.placed])
     for number, placed in enumerate(sheet.placed, 1):
         for piece in placed.pieces:
             for line in (piece.cut_line, *(cutout.cut_line for cutout in piece.cutouts.values())):
                 draw_line(canvas, origin + scale * placed.on_sheet(line), closed=True)
-        _name(canvas, sheet, number, origin, scale)
+        # The middle size has its name in its drawing, or its number in the list above where there is no room.
+        middle = placed.pieces[len(placed.pieces) // 2]
+        holes = [shapely.Polygon(placed.on_sheet(cutout.cut_line)).buffer(0) for cutout in middle.cutouts.values()]
+        cloth = shapely.Polygon(placed.on_sheet(middle.cut_line)).buffer(-0.0005 / scale)
+        cloth = cloth.difference(shapely.union_all(holes))
+        labels = (
+            fit_label(cloth, [(text, NAME_HEIGHT / scale)], least=least)
+            for text, least in ((names[middle.name], 0.7), (str(number), 0.5))
+        )
+        label = next((each for each in labels if each is not None), None)
+        for written in () if label is None else label.words():
+            small = replace(written, height=written.height * scale, bold=False)
+            draw_words(canvas, small, np.column_stack([scale * np.eye(2), origin]))
     page_footer(canvas, garment.name, paper, translate("print this page first and measure both squares"))
     canvas.showPage()
-
-
-def _name(canvas: Any, sheet: Sheet, number: int, origin: FloatArray, scale: float) -> None:
-    """Write a piece's name in its drawing, or its number in the list above where there is no room."""
-    import shapely
-
-    placed = sheet.placed[number - 1]
-    piece = placed.pieces[len(placed.pieces) // 2]
-    holes = [shapely.Polygon(placed.on_sheet(cutout.cut_line)).buffer(0) for cutout in piece.cutouts.values()]
-    cloth = (
-        shapely.Polygon(placed.on_sheet(piece.cut_line)).buffer(-0.0005 / scale).difference(shapely.union_all(holes))
-    )
-    title = piece_titles([p.pieces[0].piece for p in sheet.placed])[piece.name]
-    for text, least in ((title, 0.7), (str(number), 0.5)):
-        label = fit_label(cloth, [(text, NAME_HEIGHT / scale)], least=least)
-        if label is not None:
-            break
-    else:
-        return
-    for words in label.words():
-        small = replace(words, height=words.height * scale, bold=False)
-        draw_words(canvas, small, np.column_stack([scale * np.eye(2), origin]))
 
 
 def _square(canvas: Any, x: float, y: float, side: float, text: str) -> None:

@@ -159,36 +159,32 @@ def draw_figure(
     pen.resize(width, height + _STRIP + foot)
     pen.scale_bar(MARGIN, pen.height - 0.27, page_scale)
     pen.write(MARGIN, pen.height - 0.48, shared, LABEL_SIZE, color=GREY)
-    _draw_colours(pen, colours, density, areas)
+    # The scale of the colours goes up to the right margin, the share of the area above its end beside it.
+    left, top, above = MARGIN + _SCALE_BAR, pen.height - 0.24, density > colours.high
+    if colours.high <= SMALLEST_SCALE and not above.any():
+        words = "strain energy density: none, the cloth lies flat without strain"
+        pen.write(left, top, pen.shorten(words, _WORDS_SIZE, pen.width - left - MARGIN), _WORDS_SIZE)
+    else:
+        right = pen.width - (_NOTE if above.any() else _PLAIN)
+        words = pen.shorten("strain energy density [J/m²]", _WORDS_SIZE, right - left - 0.15 - _SHORTEST_BAR)
+        pen.write(left, top, words, _WORDS_SIZE)
+        left += pen.measure(words, _WORDS_SIZE)[0] + 0.15
+        extend = "max" if above.any() else "neither"
+        bar = pen.colour_bar(colours, left, top - 0.5 * _BAR_HEIGHT, right - left, _BAR_HEIGHT, extend=extend)
+        bar.formatter.set_powerlimits((-3, 4))
+        bar.ax.locator_params("x", nbins=int(np.clip((right - left) / 0.45, 1, 9)), steps=[1, 2, 2.5, 5, 10])
+        total = float(areas.sum())
+        if above.any() and total > 0.0:
+            part = float(areas[above].sum()) / total
+            percent = f"{100 * part:.1f} %" if part >= 0.001 else "under 0.1 %"
+            text = f"clipped: {percent} of the area\nis above, up to {density.max():.3g} J/m²"
+            pen.write(right + 0.12, top, text, LABEL_SIZE, color=GREY, linespacing=1.35)
     top = pen.height - _STRIP
     if band is not None:
         band.draw(pen, MARGIN, top)
     for cell in cells:
         _draw_cell(pen, cell, top, page_scale)
     return pen.figure
-
-
-def _draw_colours(pen: Pen, scale: Scale, density: FloatArray, areas: FloatArray) -> None:
-    """Draw the scale of the colours up to the right margin, and the share of the area above its end; words if there is no strain."""
-    left, top, above = MARGIN + _SCALE_BAR, pen.height - 0.24, density > scale.high
-    if scale.high <= SMALLEST_SCALE and not above.any():
-        words = "strain energy density: none, the cloth lies flat without strain"
-        pen.write(left, top, pen.shorten(words, _WORDS_SIZE, pen.width - left - MARGIN), _WORDS_SIZE)
-        return
-    right = pen.width - (_NOTE if above.any() else _PLAIN)
-    words = pen.shorten("strain energy density [J/m²]", _WORDS_SIZE, right - left - 0.15 - _SHORTEST_BAR)
-    pen.write(left, top, words, _WORDS_SIZE)
-    left += pen.measure(words, _WORDS_SIZE)[0] + 0.15
-    extend = "max" if above.any() else "neither"
-    bar = pen.colour_bar(scale, left, top - 0.5 * _BAR_HEIGHT, right - left, _BAR_HEIGHT, extend=extend)
-    bar.formatter.set_powerlimits((-3, 4))
-    bar.ax.locator_params("x", nbins=int(np.clip((right - left) / 0.45, 1, 9)), steps=[1, 2, 2.5, 5, 10])
-    total = float(areas.sum())
-    if above.any() and total > 0.0:
-        share = float(areas[above].sum()) / total
-        percent = f"{100 * share:.1f} %" if share >= 0.001 else "under 0.1 %"
-        text = f"clipped: {percent} of the area\nis above, up to {density.max():.3g} J/m²"
-        pen.write(right + 0.12, top, text, LABEL_SIZE, color=GREY, linespacing=1.35)
 
 
 @dataclass(kw_only=True, eq=False)

@@ -103,8 +103,20 @@ def surface_of_file(
         InputError: one line that names the file.
     """
     file, raw, scale, sources = read
-    if component is None:
-        _refuse_stray_vertex(raw, scale, file)
+    # A vertex far from all others would otherwise show as a piece too large, or as slivers.
+    if (
+        component is None
+        and len(raw.vertices)
+        and not float(np.ptp(raw.vertices, axis=0).max()) * scale <= POSSIBLE[1]  # true for NaN too
+    ):
+        used = np.unique(raw.polygons[raw.polygons >= 0])
+        used = used[used < len(raw.vertices)]
+        points = raw.vertices[used]
+        # What is no number, or out of all bounds, is refused with the rest of what no mesh has.
+        if len(points) and np.abs(points).max() < 1e20 and float(np.ptp(points, axis=0).max()) * scale > POSSIBLE[1]:
+            stray = stray_vertex(points)
+            if stray is not None:
+                raise InputError(f"{file}: {stray_words(int(used[stray]), points[stray])}")
     surface = make_surface(
         raw.vertices * scale,
         raw.polygons,
@@ -116,7 +128,22 @@ def surface_of_file(
         source=str(file),
     )
     check_size(surface, file, scale)
-    surface = _snap_curves(surface, {plain_label(key): curve * scale for key, curve in raw.curves.items()})
+    if raw.curves:
+        from scipy.spatial import cKDTree
+
+        size = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
+        notes, lines = list(surface.notes), dict[str, IntArray]()
+        curves = {plain_label(key): curve * scale for key, curve in raw.curves.items()}
+        for title, curve in curves.items():
+            try:
+                lines[title] = line_from_curve(surface, curve, name=title)
+            except InputError as error:
+                notes.append(f"line left out: {error}")
+                continue
+            off, _ = cKDTree(curve).query(surface.vertices[lines[title]])
+            if off.max() > 1e-6 * size:
+                notes.append(f"line {quote_value(title)} was drawn along the nearest edges")
+        surface = replace(with_lines(surface, lines), notes=tuple(notes))
     return replace(surface, notes=(*raw.notes, *surface.notes), sources=tuple(dict.fromkeys(sources)))
 
 
@@ -212,24 +239,6 @@ def _read(file: Path, units: str | None, prim: str | None) -> RawMesh:
     return raw if scale is None else replace(raw, scale=scale)
 
 
-def _refuse_stray_vertex(raw: RawMesh, scale: float, file: Path) -> None:
-    """Name a vertex far from all others, which would otherwise show as a piece too large, or as slivers.
-
-    Raises:
-        InputError: there is one.
-    """
-    if not len(raw.vertices) or float(np.ptp(raw.vertices, axis=0).max()) * scale <= POSSIBLE[1]:
-        return
-    used = np.unique(raw.polygons[raw.polygons >= 0])
-    used = used[used < len(raw.vertices)]
-    points = raw.vertices[used]
-    # What is no number, or out of all bounds, is refused with the rest of what no mesh has.
-    if len(points) and np.abs(points).max() < 1e20 and float(np.ptp(points, axis=0).max()) * scale > POSSIBLE[1]:
-        stray = stray_vertex(points)
-        if stray is not None:
-            raise InputError(f"{file}: {stray_words(int(used[stray]), points[stray])}")
-
-
 def check_size(surface: Surface, file: Path, scale: float) -> None:
     """Check that a piece of a file of this scale [metres per unit] is as large as a piece of a garment can be.
 
@@ -279,24 +288,3 @@ def extent_words(vertices: FloatArray, units: str | None) -> str:
     if likely in (None, units) or _LIKELY[0] <= size <= _LIKELY[1]:
         return words
     return f"{words}; in {likely} it would be {size / METRES_PER_UNIT[units or 'm'] * METRES_PER_UNIT[likely or 'm']:.3g} m"
-
-
-def _snap_curves(surface: Surface, curves: dict[str, FloatArray]) -> Surface:
-    """Add curves as feature lines; a curve that does not lie on the piece is left out with a note."""
-    if not curves:
-        return surface
-    from scipy.spatial import cKDTree
-
-    size = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
-    notes = list(surface.notes)
-    lines = {}
-    for name, curve in curves.items():
-        try:
-            lines[name] = line_from_curve(surface, curve, name=name)
-        except InputError as error:
-            notes.append(f"line left out: {error}")
-            continue
-        off, _ = cKDTree(curve).query(surface.vertices[lines[name]])
-        if off.max() > 1e-6 * size:
-            notes.append(f"line {quote_value(name)} was drawn along the nearest edges")
-    return replace(with_lines(surface, lines), notes=tuple(notes))

@@ -7,6 +7,7 @@ import json
 import logging
 import warnings
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -51,7 +52,13 @@ def read_with_trimesh(file: Path, *, node: str | None) -> RawMesh:
         getattr(getattr(geometry, "visual", None), "kind", None) == "texture" for geometry in scene.geometry.values()
     )
     total = sum(len(one.vertices) for one in meshes)
-    elements = [_edges(geometry) for geometry in scene.geometry.values()] if suffix == ".ply" else []
+    elements = list[NDArray[np.int64]]()
+    for geometry in scene.geometry.values() if suffix == ".ply" else ():
+        # Trimesh leaves the edges that a PLY file lists as they are.
+        data = geometry.metadata.get("_ply_raw", {}).get("edge", {}).get("data")
+        with suppress(IndexError, KeyError, TypeError, ValueError):  # none, or under other names
+            pairs = [np.asarray(data[end]).ravel() for end in ("vertex1", "vertex2")]
+            elements.append(np.stack(pairs, axis=1).astype(np.int64))
     edges = np.concatenate([*elements, np.empty((0, 2), dtype=np.int64)])
     if len(edges) and not 0 <= edges.min() <= edges.max() < total:
         raise InputError(f"an edge refers to vertex {edges.max()}, but the file has {total:,}, numbered from 0")
@@ -119,16 +126,6 @@ def _load_scene(file: Path) -> tuple[Any, dict[str, str], list[str]]:
             f"not a readable {suffix[1:].upper()} file: damaged, cut short, or with more in it than its reader knows; save it again with "
             "vertices and faces alone"
         ) from error
-
-
-def _edges(geometry: Any) -> NDArray[np.int64]:
-    """Return the edges that a PLY file lists (#E by 2), which trimesh leaves as they are."""
-    data = geometry.metadata.get("_ply_raw", {}).get("edge", {}).get("data")
-    try:
-        pairs = [np.asarray(data[end]).ravel() for end in ("vertex1", "vertex2")]
-        return np.stack(pairs, axis=1).astype(np.int64)
-    except (IndexError, KeyError, TypeError, ValueError):  # none, or under other names
-        return np.empty((0, 2), dtype=np.int64)
 
 
 def _materials(head: bytes, geometry: list[str]) -> dict[str, str]:

@@ -5,7 +5,7 @@ The process that reads a file loads this module only: see :mod:`warpflat.flat.su
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -82,7 +82,18 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> tuple[
     for each in stage.TraverseAll():
         if any(isinstance(error, Pcp.ErrorUnresolvedPrimPath) for error in each.GetPrimIndex().localErrors):
             raise InputError(f"{each.GetPath()} is not whole: a layer does not have what it refers to there")
-    chosen = _chosen([p for p in stage.Traverse(Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.Mesh)], prim)
+    chosen = [p for p in stage.Traverse(Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.Mesh)]
+    paths = [str(p.GetPath()) for p in chosen]
+    if not chosen:
+        raise InputError("holds no mesh prim")
+    if prim is None and len(chosen) > 1:
+        some = ", ".join(paths[:8]) + (f" and {len(paths) - 8} more" if len(paths) > 8 else "")
+        raise InputError(f"holds {len(chosen)} mesh prims; choose one with prim = one of: {some}")
+    if prim is not None and prim != ALL_PRIMS:
+        chosen = [p for p in chosen if str(p.GetPath()) == prim] or [p for p in chosen if p.GetName() == prim]
+        if len(chosen) != 1:
+            what = "names several mesh prims" if chosen else "is not a mesh prim"
+            raise InputError(f"prim {prim!r} {what}; {nearest(prim, paths)}")
     notes = [
         f"{each.GetPath()} repeats meshes, of which each was read once; make its instances real, or save each as a mesh"
         for each in stage.Traverse()
@@ -129,23 +140,6 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> tuple[
     return mesh, [layer.realPath for layer in stage.GetUsedLayers() if layer.realPath]
 
 
-def _chosen(meshes: Sequence[Any], prim: str | None) -> Sequence[Any]:
-    """Return the mesh prims of a stage that are asked for."""
-    paths = [str(p.GetPath()) for p in meshes]
-    if not meshes:
-        raise InputError("holds no mesh prim")
-    if prim is None and len(meshes) > 1:
-        some = ", ".join(paths[:8]) + (f" and {len(paths) - 8} more" if len(paths) > 8 else "")
-        raise InputError(f"holds {len(meshes)} mesh prims; choose one with prim = one of: {some}")
-    if prim is None or prim == ALL_PRIMS:
-        return meshes
-    chosen = [p for p in meshes if str(p.GetPath()) == prim] or [p for p in meshes if p.GetName() == prim]
-    if len(chosen) != 1:
-        what = "names several mesh prims" if chosen else "is not a mesh prim"
-        raise InputError(f"prim {prim!r} {what}; {nearest(prim, paths)}")
-    return chosen
-
-
 @dataclass(kw_only=True)
 class _Part:
     """One mesh prim: the number of corners of each face, all corners and their texture (#C by 2), names of faces, rows of creases."""
@@ -161,7 +155,7 @@ class _Part:
 
 def _read_mesh(one: Any, to_metres: ToMetres, notes: list[str]) -> _Part:
     """Read a mesh prim, without the faces that are holes."""
-    from pxr import UsdGeom, UsdShade
+    from pxr import Usd, UsdGeom, UsdShade
 
     mesh = UsdGeom.Mesh(one)
     counts, flat = _value(mesh.GetFaceVertexCountsAttr()), _value(mesh.GetFaceVertexIndicesAttr())
@@ -188,10 +182,24 @@ def _read_mesh(one: Any, to_metres: ToMetres, notes: list[str]) -> _Part:
         raise InputError(f"mesh {at} has no faces: all are holes")
     sizes, corners = all_sizes[kept], all_corners[np.repeat(kept, all_sizes)]
     vertices, mirrored = to_metres(points, one)
-    texture = _texture(one, all_corners, len(points))
-    if texture is None:
-        notes.append(f"texture coordinates of mesh {at} are broken and were left out")
-        texture = np.full((len(all_corners), 2), np.nan)
+    # Of the texture coordinates `st` comes first, then any other primvar of pairs with a value for each corner or point.
+    texture = np.full((len(all_corners), 2), np.nan)
+    kinds = ("texCoord2f[]", "texCoord2d[]", "texCoord2h[]", "float2[]", "double2[]")
+    ways = (UsdGeom.Tokens.faceVarying, UsdGeom.Tokens.vertex, UsdGeom.Tokens.varying)
+    known = [
+        primvar
+        for primvar in UsdGeom.PrimvarsAPI(one).GetPrimvarsWithValues()
+        if str(primvar.GetTypeName()) in kinds and primvar.GetInterpolation() in ways
+    ]
+    known.sort(key=lambda primvar: primvar.GetPrimvarName() != "st")
+    if known:
+        flattened = known[0].ComputeFlattened() or known[0].ComputeFlattened(Usd.TimeCode.EarliestTime())
+        values = np.asarray(flattened if flattened is not None else [], dtype=np.float64).reshape(-1, 2)
+        of_corners = known[0].GetInterpolation() == UsdGeom.Tokens.faceVarying
+        if len(values) == len(all_corners if of_corners else points):
+            texture = values if of_corners else values[all_corners]
+        else:
+            notes.append(f"texture coordinates of mesh {at} are broken and were left out")
     texture = texture[np.repeat(kept, all_sizes)]
     # Faces without a subset that binds a material have that of the mesh.
     bound = UsdShade.MaterialBindingAPI(one).GetDirectBinding().GetMaterialPath()
@@ -252,31 +260,6 @@ def _read_curves(mesh: Any, to_metres: ToMetres, notes: list[str]) -> dict[str, 
                 key += "_"
             found[key] = part
     return found
-
-
-def _texture(mesh: Any, corners: NDArray[np.int64], points: int) -> FloatArray | None:
-    """Return the texture coordinates of a mesh's corners (#C by 2), all nan where it has none; None where they are broken.
-
-    `st` comes first, then any other primvar of pairs with a value for each corner or point.
-    """
-    from pxr import Usd, UsdGeom
-
-    kinds = ("texCoord2f[]", "texCoord2d[]", "texCoord2h[]", "float2[]", "double2[]")
-    ways = (UsdGeom.Tokens.faceVarying, UsdGeom.Tokens.vertex, UsdGeom.Tokens.varying)
-    known = [
-        primvar
-        for primvar in UsdGeom.PrimvarsAPI(mesh).GetPrimvarsWithValues()
-        if str(primvar.GetTypeName()) in kinds and primvar.GetInterpolation() in ways
-    ]
-    known.sort(key=lambda primvar: primvar.GetPrimvarName() != "st")
-    if not known:
-        return np.full((len(corners), 2), np.nan)
-    flat = known[0].ComputeFlattened() or known[0].ComputeFlattened(Usd.TimeCode.EarliestTime())
-    values = np.asarray(flat if flat is not None else [], dtype=np.float64).reshape(-1, 2)
-    each = known[0].GetInterpolation() == UsdGeom.Tokens.faceVarying
-    if len(values) != (len(corners) if each else points):
-        return None
-    return values if each else values[corners]
 
 
 def _subsets(mesh: Any, count: int, *, materials: bool = False) -> list[str]:

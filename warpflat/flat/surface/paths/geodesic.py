@@ -99,8 +99,24 @@ def signed_distance_and_station(
     # A path may end on the line itself, which has no side.
     lost = columns[0] == 0
     lost[path] = False
-    sides = _sides(surface, path) if lost.any() else None
-    return (x if sides is None else sides * np.abs(x)), y
+    if lost.any():
+        he = half_edges_of(surface)
+        position = np.full(len(surface.vertices), -2, dtype=np.int64)
+        position[path] = np.arange(len(path))
+        step = position[he.head] - position[he.tail]
+        on_line = (position[he.tail] >= 0) & (position[he.head] >= 0) & (np.abs(step) == 1)
+        # Faces are wound counter-clockwise: a face lies to the left of its own sides.
+        side_of_face = np.zeros(len(surface.faces))
+        side_of_face[he.face[on_line & (step > 0)]] = -1.0
+        side_of_face[he.face[on_line & (step < 0)]] = 1.0
+        part = components(surface.faces, barrier=he.edges[np.unique(he.edge[on_line])])
+        left_of, right_of = (np.isin(part, part[side_of_face == sign]) for sign in (-1.0, 1.0))
+        # Where the line does not part the surface, what lies to its left lies to its right, too.
+        if not (left_of & right_of).any():
+            sign = np.ones(len(surface.vertices))
+            sign[he.tail] = np.where(left_of, -1.0, 1.0)[he.face]
+            x = sign * np.abs(x)
+    return x, y
 
 
 def extend_to_border(surface: Surface, line: IntArray) -> tuple[IntArray, int]:
@@ -318,24 +334,3 @@ def _directions_at_line(
         about_end[len(path) + around] = np.stack([np.bincount(of, place, minlength=len(around)) for place in places], 1)
         about_ends.append(about_end)
     return known, side, (about_ends[0], about_ends[1])
-
-
-def _sides(surface: Surface, path: IntArray) -> FloatArray | None:
-    """Return #V, -1 to the left of the line and +1 to the right of it; None where the line does not part the surface."""
-    he = half_edges_of(surface)
-    position = np.full(len(surface.vertices), -2, dtype=np.int64)
-    position[path] = np.arange(len(path))
-    step = position[he.head] - position[he.tail]
-    on_line = (position[he.tail] >= 0) & (position[he.head] >= 0) & (np.abs(step) == 1)
-    # Faces are wound counter-clockwise: a face lies to the left of its own sides.
-    side_of_face = np.zeros(len(surface.faces))
-    side_of_face[he.face[on_line & (step > 0)]] = -1.0
-    side_of_face[he.face[on_line & (step < 0)]] = 1.0
-    part = components(surface.faces, barrier=he.edges[np.unique(he.edge[on_line])])
-    left, right = (np.isin(part, part[side_of_face == sign]) for sign in (-1.0, 1.0))
-    if (left & right).any():
-        return None
-    face_sign = np.where(left, -1.0, 1.0)
-    sign = np.ones(len(surface.vertices))
-    sign[he.tail] = face_sign[he.face]
-    return sign

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import project_on_segments
 from warpflat.flat.surface.mesh import Surface
@@ -177,36 +177,9 @@ def _curves(
     # A vertex in the plane counts as above it: each triangle is then crossed in two of its edges or in none. Heights of
     # rounding size must be exactly 0, or the curve would pass by a vertex instead of through it.
     height[np.abs(height) < 1e-10 * np.ptp(surface.vertices, axis=0).max()] = 0.0
-    for chain, closed in _chains(triangles, height >= 0):
-        # The first end of each edge lies above the plane, or in it, and the second below.
-        shares = [float(height[a] / (height[a] - height[b])) for a, b in chain]
-        crossings = [{a: 1.0 - t, b: t} if t > 0.0 else {a: 1.0} for (a, b), t in zip(chain, shares, strict=True)]
-        places = simplify_places(crossings)
-        if closed and len(places) > 1 and places[0] == places[-1]:
-            places.pop()
-        if len(places) >= 2:
-            yield places, closed
-
-
-def _direction(value: ArrayLike, what: str) -> FloatArray:
-    vector = np.asarray(value, dtype=float)
-    if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
-        raise InputError(f"{what} is three finite numbers, not all zero, got {value!r}")
-    return vector / np.linalg.norm(vector)
-
-
-def _chains(triangles: IntArray, above: BoolArray) -> list[tuple[list[tuple[int, int]], bool]]:
-    """Join the edges that a plane crosses to chains.
-
-    Args:
-        triangles: #T by 3.
-        above: #V, true for vertices above the plane.
-
-    Returns:
-        Chains of edges, each as (upper, lower) vertex, from border to border or around; true for those that run around.
-    """
+    above = height >= 0
     crossed = triangles[above[triangles].any(axis=1) & ~above[triangles].all(axis=1)]
-    # The two crossed edges of each triangle, and the triangles at each crossed edge.
+    # The two crossed edges of each triangle, as (upper, lower) vertex, and the triangles at each crossed edge.
     edges_of: list[list[tuple[int, int]]] = []
     triangles_at: dict[tuple[int, int], list[int]] = {}
     for index, (a, b, c) in enumerate(crossed.tolist()):
@@ -214,6 +187,7 @@ def _chains(triangles: IntArray, above: BoolArray) -> list[tuple[list[tuple[int,
         edges_of.append(pair)
         for edge in pair:
             triangles_at.setdefault(edge, []).append(index)
+    # Chains of edges run from border to border, or around.
     chains = []
     left = set(triangles_at)
     ends = [edge for edge, found in triangles_at.items() if len(found) == 1]
@@ -229,7 +203,22 @@ def _chains(triangles: IntArray, above: BoolArray) -> list[tuple[list[tuple[int,
                 left.discard(here)
                 chain.append(here)
             chains.append((chain, len(triangles_at[seed]) > 1))
-    return chains
+    for chain, closed in chains:
+        # The first end of each edge lies above the plane, or in it, and the second below.
+        shares = [float(height[a] / (height[a] - height[b])) for a, b in chain]
+        crossings = [{a: 1.0 - t, b: t} if t > 0.0 else {a: 1.0} for (a, b), t in zip(chain, shares, strict=True)]
+        places = simplify_places(crossings)
+        if closed and len(places) > 1 and places[0] == places[-1]:
+            places.pop()
+        if len(places) >= 2:
+            yield places, closed
+
+
+def _direction(value: ArrayLike, what: str) -> FloatArray:
+    vector = np.asarray(value, dtype=float)
+    if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
+        raise InputError(f"{what} is three finite numbers, not all zero, got {value!r}")
+    return vector / np.linalg.norm(vector)
 
 
 def _distances(surface: Surface, places: list[Place], closed: bool, origin: FloatArray) -> FloatArray:

@@ -123,12 +123,32 @@ def split_polygons(vertices: FloatArray, polygons: NDArray[np.int64]) -> tuple[I
         faces = np.full((len(polygons), 4), -1, dtype=np.int32)
         faces[:, : polygons.shape[1]] = polygons
         return faces, np.arange(len(polygons), dtype=np.int32)
+    import shapely
+
     large = polygons[:, 4] >= 0
     parts = [polygons[~large, :4].astype(np.int32)]
     origin = [np.flatnonzero(~large).astype(np.int32)]
     for row in np.flatnonzero(large).tolist():
         corners = polygons[row][polygons[row] >= 0]
-        triangles = _triangulated(vertices[corners], row)
+        centred = vertices[corners] - vertices[corners].mean(axis=0)
+        # The polygon's plane, by two vectors that make a right-handed orthogonal frame with its normal.
+        normal = np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0)
+        axis = np.eye(3)[int(np.argmin(np.abs(normal)))]
+        first = np.cross(axis, normal)
+        second = np.cross(normal, first)
+        flat = centred @ unit(np.array([first, second])).T
+        outline = shapely.Polygon(flat)
+        number = {corner: n for n, corner in enumerate(map(tuple, flat.tolist()))}
+        if not outline.is_valid or len(number) < len(flat):
+            raise InputError(
+                f"face {row} (counted from 0) crosses itself or touches itself: it cannot be cut into triangles"
+            )
+        rings = shapely.get_coordinates(shapely.constrained_delaunay_triangles(outline)).reshape(-1, 4, 2)[:, :3]
+        triangles = np.array([number[corner] for corner in map(tuple, rings.reshape(-1, 2).tolist())]).reshape(-1, 3)
+        # They are wound as the polygon is.
+        a, b, c = flat[triangles].transpose(1, 0, 2)
+        clockwise = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) < (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+        triangles[clockwise] = triangles[clockwise, ::-1]
         block = np.full((len(triangles), 4), -1, dtype=np.int32)
         block[:, :3] = corners[triangles]
         parts.append(block)
@@ -136,31 +156,6 @@ def split_polygons(vertices: FloatArray, polygons: NDArray[np.int64]) -> tuple[I
     index = np.concatenate(origin)
     order = np.argsort(index, kind="stable")
     return np.concatenate(parts)[order], index[order]
-
-
-def _triangulated(points: FloatArray, row: int) -> NDArray[np.int64]:
-    """Return triangles (#T by 3 local corner numbers), wound as the polygon is, of one simple polygon."""
-    import shapely
-
-    centred = points - points.mean(axis=0)
-    # The polygon's plane, by two vectors that make a right-handed orthogonal frame with its normal.
-    normal = np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0)
-    axis = np.eye(3)[int(np.argmin(np.abs(normal)))]
-    first = np.cross(axis, normal)
-    second = np.cross(normal, first)
-    flat = centred @ unit(np.array([first, second])).T
-    outline = shapely.Polygon(flat)
-    number = {corner: n for n, corner in enumerate(map(tuple, flat.tolist()))}
-    if not outline.is_valid or len(number) < len(flat):
-        raise InputError(
-            f"face {row} (counted from 0) crosses itself or touches itself: it cannot be cut into triangles"
-        )
-    rings = shapely.get_coordinates(shapely.constrained_delaunay_triangles(outline)).reshape(-1, 4, 2)[:, :3]
-    triangles = np.array([number[corner] for corner in map(tuple, rings.reshape(-1, 2).tolist())]).reshape(-1, 3)
-    a, b, c = flat[triangles].transpose(1, 0, 2)
-    clockwise = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) < (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    triangles[clockwise] = triangles[clockwise, ::-1]
-    return triangles
 
 
 def split_quads(

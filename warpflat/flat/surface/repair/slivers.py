@@ -10,7 +10,7 @@ feature line loses its way, and no face becomes degenerate or turns by more than
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from itertools import pairwise
 
 import numpy as np
@@ -313,28 +313,36 @@ class _Patch:
             if self.on_border(c):
                 return False
             self.replace_face(face, None)
-        elif not self._fan_out(face, beside, p, c, check=check):
-            return False
+        else:
+            # The cap, and the face across its longest edge, are replaced by a fan of triangles around c.
+            far = self.corners(beside)
+            at = far.index(p)
+            chain = far[at:] + far[:at]
+            if c in far or any(v in self.neighbours(c) for v in chain[1:-1]):
+                return False
+            new = [(c, x, y) for x, y in pairwise(chain)]
+            if check:
+                # Some may be narrow, too, if the edge that is given up is longer than the new ones. So the process ends, at a face
+                # that is not narrow.
+                narrow = [self.is_narrow(t) for t in new]
+                places = self.vertices[[c, *chain]]
+                lengths = np.linalg.norm(places[2:-1] - places[0], axis=1)
+                if any(narrow) and (lengths >= np.linalg.norm(places[-1] - places[1])).any():
+                    return False
+                facing = self.normal(chain)
+                if self.is_narrow(chain, _SHORT):
+                    # Such a face does not tell the side.
+                    facing = np.sum([self.normal(self.corners(f)) for v in (c, *chain) for f in self.around(v)], axis=0)
+                if not all(thin or float(self.normal(t) @ facing) > 0 for t, thin in zip(new, narrow, strict=True)):
+                    return False
+            self.replace_face(face, None)
+            self.replace_face(beside, new[0])
+            for triangle in new[1:]:
+                self.replace_face(None, triangle, origin=beside)
         for line in along:
             for i in range(len(line) - 1, 0, -1):
                 if {line[i - 1], line[i]} == {p, q}:
                     line.insert(i, c)
-        return True
-
-    def _fan_out(self, cap: int, beside: int, p: int, c: int, *, check: bool) -> bool:
-        """Replace a cap and the face across its longest edge, which begins at p, by a fan of triangles around the cap's corner c."""
-        far = self.corners(beside)
-        at = far.index(p)
-        chain = far[at:] + far[:at]
-        if c in far or any(v in self.neighbours(c) for v in chain[1:-1]):
-            return False
-        new = [(c, x, y) for x, y in pairwise(chain)]
-        if check and not self._all_face_alike(new, chain, c):
-            return False
-        self.replace_face(cap, None)
-        self.replace_face(beside, new[0])
-        for triangle in new[1:]:
-            self.replace_face(None, triangle, origin=beside)
         return True
 
     def remove_cap_beside(self, face: int, side: int) -> bool:
@@ -363,22 +371,6 @@ class _Patch:
             return True
         self.changed, self.origin, self._around, self.lines, self.touched, self.next_face = before
         return False
-
-    def _all_face_alike(self, new: Sequence[tuple[int, ...]], chain: tuple[int, ...], c: int) -> bool:
-        """Return whether the triangles from c that replace the face `chain` have an area and face to its side.
-
-        Some may be narrow, too, if the edge that is given up, from the first to the last of `chain`, is longer than the
-        new ones. So the process ends, at a face that is not narrow.
-        """
-        narrow = [self.is_narrow(t) for t in new]
-        p = self.vertices[[c, *chain]]
-        if any(narrow) and (np.linalg.norm(p[2:-1] - p[0], axis=1) >= np.linalg.norm(p[-1] - p[1])).any():
-            return False
-        facing = self.normal(chain)
-        if self.is_narrow(chain, _SHORT):
-            # Such a face does not tell the side.
-            facing = np.sum([self.normal(self.corners(f)) for v in (c, *chain) for f in self.around(v)], axis=0)
-        return all(thin or float(self.normal(t) @ facing) > 0 for t, thin in zip(new, narrow, strict=True))
 
     def _across(self, face: int, p: int, q: int) -> int | None:
         """Return the face beside `face` at its side p-q."""

@@ -152,27 +152,22 @@ class Targets:
             key = re.sub(r"-(incr|decr|up|down|in|out)$", "", name).replace("/l-", "/").replace("/r-", "/")
             self._axes.setdefault(key, []).append(name)
 
-    def _target(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        if name not in self._read:
-            rows = [
-                line.split()
-                for line in gzip.decompress(self._files.read(f"{ROOT}targets/{name}.target.gz")).decode().splitlines()
-                if line.strip() and not line.startswith("#")
-            ]
-            self._read[name] = (
-                np.array([int(row[0]) for row in rows], dtype=int),
-                np.array([[float(each) for each in row[1:4]] for row in rows]).reshape(-1, 3),
-            )
-        return self._read[name]
-
     def mix(self, base: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Return the vertices [dm] of one random person."""
         result = base.copy()
 
         def add(name: str, weight: float) -> None:
-            if weight and name in self._names:
-                index, move = self._target(name)
-                result[index] += weight * move
+            if not weight or name not in self._names:
+                return
+            if name not in self._read:
+                text = gzip.decompress(self._files.read(f"{ROOT}targets/{name}.target.gz")).decode()
+                rows = [line.split() for line in text.splitlines() if line.strip() and not line.startswith("#")]
+                self._read[name] = (
+                    np.array([int(row[0]) for row in rows], dtype=int),
+                    np.array([[float(each) for each in row[1:4]] for row in rows]).reshape(-1, 3),
+                )
+            index, move = self._read[name]
+            result[index] += weight * move
 
         def between(value: float, low: str, middle: str, high: str) -> dict[str, float]:
             return {middle: 1.0 - abs(value), low: max(-value, 0.0), high: max(value, 0.0)}
