@@ -26,7 +26,13 @@ def program() -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # USD prints a banner for each of its settings in the environment, in every process that loads it.
     os.environ.setdefault("TF_ENV_SETTING_ALERTS_ENABLED", "0")
-    _silence_libraries()
+    import logging
+    import warnings
+
+    # Warnings and logs of libraries are for programmers, and a mistake is one line.
+    if not sys.warnoptions:  # python -W and PYTHONWARNINGS ask for them
+        warnings.simplefilter("ignore")
+    logging.getLogger().addHandler(logging.NullHandler())
     code: int | None = None
     try:
         from warpflat.app.cli.main import main
@@ -40,16 +46,6 @@ def program() -> int:
         # All files are closed; to look for what is unreachable once more before the process ends takes half a second.
         gc.freeze()
     return code
-
-
-def _silence_libraries() -> None:
-    """Keep warnings and logs of libraries off standard error: they are for programmers, and a mistake is one line."""
-    import logging
-    import warnings
-
-    if not sys.warnoptions:  # python -W and PYTHONWARNINGS ask for them
-        warnings.simplefilter("ignore")
-    logging.getLogger().addHandler(logging.NullHandler())
 
 
 if __name__ == "__main__":

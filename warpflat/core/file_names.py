@@ -32,7 +32,20 @@ def check_file_name(name: str) -> str:
     Raises:
         InputError: it is no text, empty, too long, leads to another folder, or is refused by some system.
     """
-    if reason := _refused(name):
+    reason = ""
+    if not isinstance(name, str):
+        reason = "it is no text"
+    elif not name.strip():
+        reason = "it is empty"
+    elif forbidden := next(filter(_is_forbidden, name), ""):
+        reason = f"it has {forbidden!r} in it"
+    elif name.startswith("."):
+        reason = "it begins with a dot, and would be hidden"
+    elif _is_device(name):
+        reason = "Windows keeps it for a device"
+    elif (length := len(name.encode())) > _MOST_BYTES:
+        reason = f"it takes {length} bytes, {_MOST_BYTES} are the most"
+    if reason:
         raise InputError(
             f"{quote_value(name)} cannot name a file: {reason}; letters of any language, digits, spaces, - and _ can"
         )
@@ -95,22 +108,6 @@ def plain_name(name: str, others: str = " _.-") -> str:
 def same_file(name: str) -> str:
     """Return a key that is equal for names of one file on Windows or macOS, where capitals and composition do not count."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
-
-
-def _refused(name: object) -> str:
-    if not isinstance(name, str):
-        return "it is no text"
-    if not name.strip():
-        return "it is empty"
-    if forbidden := next(filter(_is_forbidden, name), ""):
-        return f"it has {forbidden!r} in it"
-    if name.startswith("."):
-        return "it begins with a dot, and would be hidden"
-    if _is_device(name):
-        return "Windows keeps it for a device"
-    if (length := len(name.encode())) > _MOST_BYTES:
-        return f"it takes {length} bytes, {_MOST_BYTES} are the most"
-    return ""
 
 
 def _is_device(name: str) -> bool:

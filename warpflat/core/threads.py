@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from functools import lru_cache
 
 from warpflat.core.errors import InputError
 
@@ -21,11 +20,7 @@ def thread_count() -> int:
     Raises:
         InputError: the variable is not a whole number of at least 1.
     """
-    return _thread_count(os.environ.get("WARPFLAT_THREADS", "").strip())
-
-
-@lru_cache
-def _thread_count(wished: str) -> int:
+    wished = os.environ.get("WARPFLAT_THREADS", "").strip()
     if not wished:
         return core_count()
     if not wished.isdecimal() or int(wished) < 1:

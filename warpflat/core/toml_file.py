@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError
-from pydantic_core import ErrorDetails
 
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.file_kinds import other_kind_words
@@ -76,16 +75,10 @@ def check_table(model: type[Model], data: Mapping[str, Any], where: str = "") ->
         return model.model_validate(data)
     except ValidationError as error:
         problems = error.errors(include_url=False)
-        # A misspelled key is usually also a missing one: report the cause, not the consequence.
-        problems.sort(key=lambda p: p["type"] != "extra_forbidden")
-        more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-        message = f"{_describe(model, data, problems[0])}{more}"
-        raise InputError(f"{where}: {message}" if where else message) from None
-
-
-def _describe(model: type[BaseModel], data: Mapping[str, Any], problem: ErrorDetails) -> str:
-    location = problem["loc"]
-    kind = problem["type"]
+    # A misspelled key is usually also a missing one: report the cause, not the consequence.
+    problems.sort(key=lambda p: p["type"] != "extra_forbidden")
+    problem = problems[0]
+    location, kind = problem["loc"], problem["type"]
     # The keys of a location as the file has them (pydantic adds tags of unions), and the annotation they lead to.
     parent: Any = model
     value: Any = data
@@ -113,21 +106,20 @@ def _describe(model: type[BaseModel], data: Mapping[str, Any], problem: ErrorDet
         key = str(location[-1])
         path = ".".join([*parents, key])
         models = [one for one in _members(parent) if isinstance(one, type) and issubclass(one, BaseModel)]
-        valid = [name for model in models for name in _fields(model)]
-        return f"{path}: unknown key {quote_value(key)}; {nearest(key, valid)}"
-    if kind == "missing":
-        return f"{'.'.join([*parents, str(location[-1])])}: is missing"
-    path = ".".join(parents)
-    message = problem["msg"].removeprefix("Value error, ").removeprefix("Input ")
-    given = problem["input"]
-    if kind == "value_error" or isinstance(given, (dict, list)):
-        words = message
+        valid = [name for each in models for name in _fields(each)]
+        words = f"unknown key {quote_value(key)}; {nearest(key, valid)}"
+    elif kind == "missing":
+        path, words = ".".join([*parents, str(location[-1])]), "is missing"
     else:
-        words = f"{message}, got {quote_value(given)}"
-        if kind in ("literal_error", "enum"):
-            options = [str(x) for m in _members(parent) if get_origin(m) is Literal for x in get_args(m)]
-            words += f"; {nearest(str(given), options)}" if options else ""
-    return f"{path}: {words}" if path else words
+        path, given = ".".join(parents), problem["input"]
+        words = problem["msg"].removeprefix("Value error, ").removeprefix("Input ")
+        if kind != "value_error" and not isinstance(given, (dict, list)):
+            words += f", got {quote_value(given)}"
+            if kind in ("literal_error", "enum"):
+                options = [str(x) for m in _members(parent) if get_origin(m) is Literal for x in get_args(m)]
+                words += f"; {nearest(str(given), options)}" if options else ""
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    raise InputError(f"{': '.join(filter(None, (where, path, words)))}{more}")
 
 
 def _members(annotation: Any) -> Iterator[Any]:

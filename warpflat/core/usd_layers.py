@@ -39,8 +39,10 @@ def check_layers(path: Path) -> None:
     while todo:
         layer = todo.pop()
         name = os.path.basename(layer.realPath) or path.name
-        clips: list[str] = []
-        layer.Traverse("/", lambda at, of=layer, to=clips: to.append(str(at)) if _has_clips(of, at) else None)
+        paths = list[Any]()
+        layer.Traverse("/", paths.append)
+        prims = [layer.GetPrimAtPath(at) for at in paths if at.IsPrimPath()]
+        clips = [prim.path for prim in prims if prim and prim.HasInfo("clips")]
         if clips:
             raise InputError(f"{name}: {clips[0]} takes its values from clips, which are not read; {_FLATTEN}")
         for asset in layer.GetCompositionAssetDependencies():
@@ -72,7 +74,3 @@ def check_layers(path: Path) -> None:
             if not found:
                 raise InputError(f"{where}, which is no readable USD file; put all parts beside it, or {_FLATTEN}")
             todo.append(found)
-
-
-def _has_clips(layer: Any, at: Any) -> bool:
-    return bool(at.IsPrimPath() and (prim := layer.GetPrimAtPath(at)) and prim.HasInfo("clips"))

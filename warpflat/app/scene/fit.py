@@ -17,7 +17,6 @@ from warpflat.app.review.figures import count_pieces
 from warpflat.app.scene.load import errors_named, make_scene, scene_fabric
 from warpflat.app.scene.options import COMMAND_LINE, errors_of_options
 from warpflat.core import (
-    FloatArray,
     InputError,
     aligned,
     atomic_path,
@@ -30,7 +29,6 @@ from warpflat.garment import EASE_LEVELS, EASE_RANGE
 
 if TYPE_CHECKING:
     from warpflat.app.scene.run import SceneResult
-    from warpflat.flat import RawMesh
     from warpflat.garment import Carried, FitJob
 
 __all__ = [
@@ -177,8 +175,31 @@ def fit_to(
     from warpflat.core import output_folder, record_file
 
     patterned = keeps_pattern(job, tables)
+    # The file's mesh on the body, with its texture, groups and materials, along which it may be cut.
+    raw = job.mesh_on(carried, patterned=patterned)
+    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in carried.vertices.tolist()]
+    corner = None
+    if raw.texture is not None:
+        known = np.nan_to_num(raw.texture.reshape(-1, 2))
+        places, number = np.unique(known, axis=0, return_inverse=True)
+        corner = number.reshape(raw.polygons.shape)
+        lines += [f"vt {u:.12g} {v:.12g}" for u, v in places.tolist()]
+    ways = [(word, of) for word, of in (("g", raw.face_group), ("usemtl", raw.face_material)) if of is not None]
+    last = [-1] * len(ways)
+    for face, row in enumerate(raw.polygons.tolist()):
+        for k, (word, of) in enumerate(ways):
+            if of[0][face] != last[k]:
+                last[k] = of[0][face]
+                title = re.sub(r"[^\w.-]+", "_", of[1][last[k]]) or "part"
+                lines.append(f"{word} {title}_{last[k]}" if len(set(of[1])) < len(of[1]) else f"{word} {title}")
+        words = [
+            f"{vertex + 1}/{corner[face, k] + 1}" if corner is not None else str(vertex + 1)
+            for k, vertex in enumerate(row)
+            if vertex >= 0
+        ]
+        lines.append("f " + " ".join(words))
     meshes = {
-        f"{name}.fitted.obj": _obj_lines(carried.vertices, job.mesh_on(carried, patterned=patterned)),
+        f"{name}.fitted.obj": "\n".join(lines) + "\n",
         f"{name}.body.obj": "".join(
             [f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in carried.skin.tolist()]
             + [f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in carried.skin_faces.tolist()]
@@ -280,29 +301,3 @@ def study_table(fitted: Sequence[Fitted]) -> str:
             for row, ease in zip(rows, eases, strict=True)
         ],
     )
-
-
-def _obj_lines(vertices: FloatArray, raw: RawMesh) -> str:
-    """Return an OBJ of a file's mesh at other places [m], with its texture, groups and materials, along which it may be cut."""
-    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices.tolist()]
-    corner = None
-    if raw.texture is not None:
-        known = np.nan_to_num(raw.texture.reshape(-1, 2))
-        places, number = np.unique(known, axis=0, return_inverse=True)
-        corner = number.reshape(raw.polygons.shape)
-        lines += [f"vt {u:.12g} {v:.12g}" for u, v in places.tolist()]
-    ways = [(word, of) for word, of in (("g", raw.face_group), ("usemtl", raw.face_material)) if of is not None]
-    last = [-1] * len(ways)
-    for face, row in enumerate(raw.polygons.tolist()):
-        for k, (word, of) in enumerate(ways):
-            if of[0][face] != last[k]:
-                last[k] = of[0][face]
-                title = re.sub(r"[^\w.-]+", "_", of[1][last[k]]) or "part"
-                lines.append(f"{word} {title}_{last[k]}" if len(set(of[1])) < len(of[1]) else f"{word} {title}")
-        words = [
-            f"{vertex + 1}/{corner[face, k] + 1}" if corner is not None else str(vertex + 1)
-            for k, vertex in enumerate(row)
-            if vertex >= 0
-        ]
-        lines.append("f " + " ".join(words))
-    return "\n".join(lines) + "\n"

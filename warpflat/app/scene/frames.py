@@ -337,7 +337,13 @@ class Film:
                 for number in range(max(len(stages) for stages in pieces.values())):
                     shots = {name: self._shot(stages, number) for name, stages in pieces.items()}
                     count = max(wanted for _, _, wanted in shots.values())
-                    frames = {name: self._frames(shot[1], count) for name, shot in shots.items()}
+                    # Steps are shown as they are; whoever is at rest earlier waits.
+                    frames: dict[str, Iterator[Key | Between]] = {
+                        name: frames_along(keys, count, between=self._all_stored)
+                        if self._output.frame_every is None
+                        else chain(keys, repeat(keys[-1], count - len(keys)))
+                        for name, (_, keys, _) in shots.items()
+                    }
                     for frame in range(count):
                         for name, shot in shots.items():
                             stage = shot[0]
@@ -383,12 +389,6 @@ class Film:
             most_keys=self._most,
         )
         return stage, keys, count
-
-    def _frames(self, keys: Sequence[Key], count: int) -> Iterator[Key | Between]:
-        if self._output.frame_every is None:
-            return frames_along(keys, count, between=self._all_stored)
-        # Steps are shown as they are; whoever is at rest earlier waits.
-        return chain(keys, repeat(keys[-1], count - len(keys)))
 
 
 #: Stage of the paper's steps with which a relaxation begins (`warpflat.flat.flattening.progress`, which loads the solver).

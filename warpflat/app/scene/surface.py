@@ -14,7 +14,7 @@ from warpflat.app.scene.schema import (
     LineTable,
     ShapeSurface,
 )
-from warpflat.core import InputError, IntArray, guarded, nearest
+from warpflat.core import InputError, guarded, nearest
 from warpflat.flat import (
     RawMesh,
     Surface,
@@ -102,7 +102,29 @@ def _with_table_lines(
     """
     for name, line in tables.items():
         with errors_named(f"{where}lines.{name}"):
-            surface = with_lines(surface, {name: _line(surface, line)})
+            if line.vertices is not None:
+                ids = line_from_indices(surface, line.vertices, as_read=True)
+            elif line.from_ is not None and line.to is not None:
+                ids = line_between(surface, line.from_, line.to, as_read=True)
+            elif line.plane is not None:
+                ids = line_on_plane(surface, line.plane.point, line.plane.normal)
+            elif isinstance(line.border, BorderTable):
+                border = line.border
+                ids = line_on_border(
+                    surface, start=border.start, end=border.end, direction=border.direction, as_read=True
+                )
+            elif line.border is not None:
+                ids = line_on_border(surface, line.border)
+            elif isinstance(line.curve, list):
+                ids = line_from_curve(surface, line.curve)
+            else:
+                curve = str(line.curve).rstrip("/").rpartition("/")[2]
+                if curve not in surface.lines:
+                    raise InputError(
+                        f"the file has no curve {line.curve!r} on the piece; {nearest(curve, surface.lines)}"
+                    )
+                ids = surface.lines[curve]
+            surface = with_lines(surface, {name: ids})
     for key, name in wanted.items():
         if name not in surface.lines:
             with errors_named(f"{where}{key}"):
@@ -149,23 +171,3 @@ def _file(scene: Scene, table: FileSurface) -> Path:
         with guarded(path, "mesh", missing="does not exist"):
             path.stat()
     return path
-
-
-def _line(surface: Surface, table: LineTable) -> IntArray:
-    if table.vertices is not None:
-        return line_from_indices(surface, table.vertices, as_read=True)
-    if table.from_ is not None and table.to is not None:
-        return line_between(surface, table.from_, table.to, as_read=True)
-    if table.plane is not None:
-        return line_on_plane(surface, table.plane.point, table.plane.normal)
-    if isinstance(table.border, BorderTable):
-        border = table.border
-        return line_on_border(surface, start=border.start, end=border.end, direction=border.direction, as_read=True)
-    if table.border is not None:
-        return line_on_border(surface, table.border)
-    if isinstance(table.curve, list):
-        return line_from_curve(surface, table.curve)
-    name = str(table.curve).rstrip("/").rpartition("/")[2]
-    if name not in surface.lines:
-        raise InputError(f"the file has no curve {table.curve!r} on the piece; {nearest(name, surface.lines)}")
-    return surface.lines[name]

@@ -96,30 +96,28 @@ def read_message(message: str | bytes, parts: Mapping[str, Any]) -> bytes:
         part = parts.get(said.uuid)
         if part is None:
             raise InputError("there is no such part of the panel, or it is gone")
-        if not _can_have(part, said.updates.value):
+        value = said.updates.value
+        if isinstance(part, GuiDropdownHandle | GuiButtonGroupHandle):
+            is_possible = isinstance(value, str) and value in part.options
+        elif isinstance(part, GuiSliderHandle | GuiNumberHandle):
+            is_possible = _is_between(value, part.min, part.max)
+        elif isinstance(part, GuiMultiSliderHandle):
+            is_possible = (
+                isinstance(value, list)
+                and len(value) == len(part.value)
+                and all(_is_between(each, part.min, part.max) for each in value)
+                and value[-1] - value[0] >= (part.min_range or 0)
+            )
+        elif isinstance(part, GuiButtonHandle):
+            is_possible = value is True
+        else:
+            is_possible = isinstance(part, GuiTextHandle) and isinstance(value, str)
+        if not is_possible:
             name = getattr(part, "label", "this part of the panel")
             low, high = getattr(part, "min", None), getattr(part, "max", None)
             bounds = "" if low is None or high is None else f": {low:g} to {high:g} is possible"
-            raise InputError(f"{name} cannot be {quote_value(said.updates.value)}{bounds}")
+            raise InputError(f"{name} cannot be {quote_value(value)}{bounds}")
     return msgspec.msgpack.encode(said)
-
-
-def _can_have(part: Any, value: object) -> bool:
-    """Return whether a part of the panel can have a value."""
-    if isinstance(part, GuiDropdownHandle | GuiButtonGroupHandle):
-        return isinstance(value, str) and value in part.options
-    if isinstance(part, GuiSliderHandle | GuiNumberHandle):
-        return _is_between(value, part.min, part.max)
-    if isinstance(part, GuiMultiSliderHandle):
-        return (
-            isinstance(value, list)
-            and len(value) == len(part.value)
-            and all(_is_between(each, part.min, part.max) for each in value)
-            and value[-1] - value[0] >= (part.min_range or 0)
-        )
-    if isinstance(part, GuiButtonHandle):
-        return value is True
-    return isinstance(part, GuiTextHandle) and isinstance(value, str)
 
 
 def _is_between(value: object, low: float | None, high: float | None) -> bool:

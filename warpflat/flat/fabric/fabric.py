@@ -296,9 +296,16 @@ def check_value(key: str, value: object, what: str) -> None:
     if not is_number(value):
         raise InputError(f"{what} = {value!r} is not a number")
     if not lowest <= value <= highest:  # false for NaN too
-        raise InputError(
-            f"{what} = {value:g} {unit}".rstrip() + f" is out of range; {valid}{_unit_hint(key, float(value))}"
-        )
+        number, hint = float(value), ""
+        if key == "areal_density" and 5.0 < number <= 5000.0:
+            hint = f" (if that is in g/m2, write {number / 1000.0:g})"
+        elif key == "bending" and 0.1 < number <= 1e5:
+            hint = f" (if that is in uN m, write {1e-6 * number:g})"
+        elif key == "strain_limit" and 2.0 < number <= 200.0:
+            hint = f" (if that is in percent, write {number / 100.0:g})"
+        elif key == "shear_limit" and 0.0 < number < 0.5:
+            hint = f" (if that is in radians, write {math.degrees(number):.3g})"
+        raise InputError(f"{what} = {value:g} {unit}".rstrip() + f" is out of range; {valid}{hint}")
 
 
 def value_names() -> tuple[str, ...]:
@@ -308,15 +315,3 @@ def value_names() -> tuple[str, ...]:
 
 def _plain(name: str) -> str:
     return "-".join(name.replace("_", " ").replace("-", " ").lower().split())
-
-
-def _unit_hint(key: str, value: float) -> str:
-    if key == "areal_density" and 5.0 < value <= 5000.0:
-        return f" (if that is in g/m2, write {value / 1000.0:g})"
-    if key == "bending" and 0.1 < value <= 1e5:
-        return f" (if that is in uN m, write {1e-6 * value:g})"
-    if key == "strain_limit" and 2.0 < value <= 200.0:
-        return f" (if that is in percent, write {value / 100.0:g})"
-    if key == "shear_limit" and 0.0 < value < 0.5:
-        return f" (if that is in radians, write {math.degrees(value):.3g})"
-    return ""

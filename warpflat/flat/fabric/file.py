@@ -184,13 +184,9 @@ class FastTable(Table):
         return self
 
 
-def _number_or_table(value: Any) -> str:
-    return "table" if isinstance(value, (dict, ValueTable)) else "number"
-
-
 Quantity = Annotated[
     Annotated[float, Tag("number")] | Annotated[ValueTable, Tag("table")],
-    Discriminator(_number_or_table),
+    Discriminator(lambda value: "table" if isinstance(value, (dict, ValueTable)) else "number"),
 ]
 
 

@@ -249,21 +249,8 @@ def profile_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
     station = arc_lengths(surface.vertices[datum])
     positions = np.full((len(surface.vertices), 2), np.nan)
     positions[datum] = np.column_stack([np.zeros(len(datum)), station])
-    lines = _grid_lines(surface, np.stack([datum, datum[::-1]]))
-    stations = np.stack([station, station[::-1]])
-    p = points_at(surface.vertices, lines)
-    on = lines[1:] >= 0
-    across = np.cumsum(np.where(on, norm(p[:, 1:] - p[:, :-1]), 0.0), axis=0) * np.array([[-1.0], [1.0]])
-    positions[lines[1:][on]] = np.column_stack([across[on], np.broadcast_to(stations, across.shape)[on]])
-    whole = len(datum) + np.count_nonzero(on) == len(positions)
-    return positions if whole and not np.isnan(positions).any() else None
-
-
-def _grid_lines(surface: Surface, start: IntArray) -> IntArray:
-    """Return K lines of a quad mesh and the grid lines to the left of each: #L by #K by #N, -1 where the grid has ended.
-
-    No more lines than there are vertices for: where profiles meet again, or go around a tube, they would have no end.
-    """
+    # The grid lines to the left of the datum, and to the left of it as it runs back; -1 where the grid has ended.
+    start = np.stack([datum, datum[::-1]])
     he = half_edges_of(surface)
     here = np.arange(len(he.tail))
     # The last entry is where there is none, -1.
@@ -279,8 +266,9 @@ def _grid_lines(surface: Surface, start: IntArray) -> IntArray:
         h = some[place]
         return np.where((a < 0) | (b < 0) | (keys[place] != wanted), -1, np.where(tail[h] == a, h, twin[h]))
 
-    lines = [start]
+    rows = [start]
     edge, left = along(start[:, :-1], start[:, 1:]), len(surface.vertices)
+    # No more lines than there are vertices for: where profiles meet again, or go around a tube, they would have no end.
     while left > 0:
         # Of the four sides of a quad, numbered in a row, the one opposite.
         ahead = np.where(edge >= 0, edge ^ 2, -1)
@@ -293,13 +281,20 @@ def _grid_lines(surface: Surface, start: IntArray) -> IntArray:
         reached = int(np.count_nonzero(following >= 0))
         if reached == 0:
             break
-        lines.append(following)
+        rows.append(following)
         left -= reached
         edge = twin[ahead]
         if (edge < 0).any():
             # Past a hole the line goes on.
             edge = along(following[:, :-1], following[:, 1:])
-    return np.stack(lines)
+    lines = np.stack(rows)
+    stations = np.stack([station, station[::-1]])
+    p = points_at(surface.vertices, lines)
+    on = lines[1:] >= 0
+    across = np.cumsum(np.where(on, norm(p[:, 1:] - p[:, :-1]), 0.0), axis=0) * np.array([[-1.0], [1.0]])
+    positions[lines[1:][on]] = np.column_stack([across[on], np.broadcast_to(stations, across.shape)[on]])
+    whole = len(datum) + np.count_nonzero(on) == len(positions)
+    return positions if whole and not np.isnan(positions).any() else None
 
 
 def geodesic_layout(surface: Surface, datum: IntArray) -> FloatArray | None:

@@ -131,7 +131,27 @@ def judge(metrics: Mapping[str, Any]) -> Verdict | None:
                     remedy="give more ease there, or choose a softer cloth",
                 )
             )
-    found += _girths(metrics.get("girths") or {})
+    # Levels at which the garment is larger than it was drafted, and those whose ease is not the one asked for.
+    girths: Mapping[str, Mapping[str, float]] = metrics.get("girths") or {}
+    for level, girth in girths.items():
+        other = girths.get(other_side(level), girth)
+        alike = other is not girth and abs(other["ease_m"] - girth["ease_m"]) < _ALIKE
+        if alike and level != without_side(level) + " left":
+            continue
+        name, asked = without_side(level) if alike else level, girth.get("ease_wanted_m")
+        ease, drafted = girth["ease_m"], girth["form_m"] - girth["body_m"]
+        if (asked is not None or without_side(level) in _MAIN_GIRTHS) and ease - drafted > TOO_LARGE * girth["form_m"]:
+            found.append(
+                Finding(
+                    kind="too large",
+                    fails=True,
+                    words=f"too large: {name} {100 * ease:+.1f} cm, {100 * drafted:+.1f} were drafted",
+                    remedy=f"take it in at the {name}",
+                )
+            )
+        elif asked is not None and abs(ease - asked) > _EASE_MISSED:
+            words = f"ease: {name} {100 * ease:+.1f} cm, {100 * asked:+.1f} asked for"
+            found.append(Finding(kind="ease", fails=False, words=words))
     found += [
         Finding(
             kind="opening",
@@ -179,29 +199,4 @@ def _held(
                 kind="folds", fails=False, words=f"{100 * slack:.1f} % of the cloth lies in folds; {worst}: {place}"
             )
         )
-    return found
-
-
-def _girths(girths: Mapping[str, Mapping[str, float]]) -> list[Finding]:
-    """Return levels at which the garment is larger than it was drafted, and those whose ease is not the one asked for."""
-    found = []
-    for level, girth in girths.items():
-        other = girths.get(other_side(level), girth)
-        alike = other is not girth and abs(other["ease_m"] - girth["ease_m"]) < _ALIKE
-        if alike and level != without_side(level) + " left":
-            continue
-        name, asked = without_side(level) if alike else level, girth.get("ease_wanted_m")
-        ease, drafted = girth["ease_m"], girth["form_m"] - girth["body_m"]
-        if (asked is not None or without_side(level) in _MAIN_GIRTHS) and ease - drafted > TOO_LARGE * girth["form_m"]:
-            found.append(
-                Finding(
-                    kind="too large",
-                    fails=True,
-                    words=f"too large: {name} {100 * ease:+.1f} cm, {100 * drafted:+.1f} were drafted",
-                    remedy=f"take it in at the {name}",
-                )
-            )
-        elif asked is not None and abs(ease - asked) > _EASE_MISSED:
-            words = f"ease: {name} {100 * ease:+.1f} cm, {100 * asked:+.1f} asked for"
-            found.append(Finding(kind="ease", fails=False, words=words))
     return found

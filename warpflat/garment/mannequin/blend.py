@@ -94,6 +94,8 @@ def adjusted_vertices(
     Raises:
         InputError: for a level that cannot be adjusted, or an order that turns two profiles over.
     """
+    from scipy.interpolate import PchipInterpolator
+
     ease = ease or {}
     known = [*EASED_LEVELS, "crotch"]
     for level in ease:
@@ -109,17 +111,43 @@ def adjusted_vertices(
         if change.like and (-1 in parts or parts[0] != parts[1]):
             raise InputError(f"form: profile {level} cannot be like {change.like}; take a level of the same part")
     out = vertices.copy()
-    if profiles or ruled or ease or bridged:
-        changes = {level: (profiles.get(level, Adjustment()), ease.get(level, 0.0)) for level in {*profiles, *ease}}
-        _move_rings(out, layout, vertices, changes, ruled)
-        for pair in bridged:
-            bridge_rows(out, layout.rings, layout.level_row, pair)
-        _move_sheet(out, layout, vertices, changes.get("chest"))
-        _move_arms(out, layout, vertices, changes, ruled)
-        _move_legs(out, layout, vertices, changes, ruled)
-        # The neck follows its base, its top stays.
-        share = np.linspace(1.0, 0.0, len(layout.neck))[:, None, None]
-        out[layout.neck] = vertices[layout.neck] + share * (out[layout.neck[0]] - vertices[layout.neck[0]])
+    if not (profiles or ruled or ease or bridged):
+        return out
+    changes = {level: (profiles.get(level, Adjustment()), ease.get(level, 0.0)) for level in {*profiles, *ease}}
+    # The rings of the trunk first: sheet, arms and legs hang from them.
+    rows = np.array([layout.level_row[level] for level in RING_LEVELS])
+    moves = _level_moves(
+        vertices, layout.rings, layout.level_row, RING_LEVELS, changes, lambda row, *how: _changed(row, *how) - row
+    )
+    for pair in ruled:
+        if set(pair) <= set(RING_LEVELS):
+            _hang_below_belly(moves, vertices, layout, sorted(map(RING_LEVELS.index, pair)))
+    heights = [
+        float(vertices[layout.rings[r[0]], 1].mean() + m[:, 1].mean())
+        for r, m in zip(rows[:, None], moves, strict=True)
+    ]
+    for (low, h0), (high, h1) in itertools.pairwise(zip(RING_LEVELS, heights, strict=True)):
+        if h1 - h0 < 0.01:
+            raise InputError(f"form: profile {high} comes to lie less than 1 cm above {low}; lower raise_cm")
+    between = np.arange(rows[0], rows[-1] + 1)
+    ids = layout.rings[between]
+    # Against height, not row number: the spacing of rows changes from one band to the next.
+    y = vertices[layout.rings[:, 0], 1]
+    out[ids] += PchipInterpolator(y[rows], np.stack(moves), axis=0)(y[between])
+    # The rings around both legs cut their corners: it is the legs that push a skirt out.
+    solid = np.unique(np.concatenate([ids.ravel(), *(grid.ravel() for grid in layout.legs.values())]))
+    row_of = {level: layout.level_row[level] for level in RING_LEVELS}
+    for pair in ruled:
+        if not set(pair) & {*ARM_LEVELS, *LEG_LEVELS}:
+            rule_rows(out, layout.rings, row_of, pair, vertices[solid])
+    for pair in bridged:
+        bridge_rows(out, layout.rings, layout.level_row, pair)
+    _move_sheet(out, layout, vertices, changes.get("chest"))
+    _move_arms(out, layout, vertices, changes, ruled)
+    _move_legs(out, layout, vertices, changes, ruled)
+    # The neck follows its base, its top stays.
+    share = np.linspace(1.0, 0.0, len(layout.neck))[:, None, None]
+    out[layout.neck] = vertices[layout.neck] + share * (out[layout.neck[0]] - vertices[layout.neck[0]])
     return out
 
 
@@ -143,41 +171,6 @@ def _changed(row: FloatArray, other: FloatArray | None, change: Adjustment, ease
         new = scale_to_girth(new + outward * normal * grow / (2.0 * math.pi), girth)
     new[:, 1] += change.raise_cm / 100.0
     return new
-
-
-def _move_rings(
-    out: FloatArray,
-    layout: Layout,
-    body: FloatArray,
-    changes: Mapping[str, tuple[Adjustment, float]],
-    ruled: Sequence[tuple[str, str]],
-) -> None:
-    from scipy.interpolate import PchipInterpolator
-
-    rows = np.array([layout.level_row[level] for level in RING_LEVELS])
-    moves = _level_moves(
-        body, layout.rings, layout.level_row, RING_LEVELS, changes, lambda row, *how: _changed(row, *how) - row
-    )
-    for pair in ruled:
-        if set(pair) <= set(RING_LEVELS):
-            _hang_below_belly(moves, body, layout, sorted(map(RING_LEVELS.index, pair)))
-    heights = [
-        float(body[layout.rings[r[0]], 1].mean() + m[:, 1].mean()) for r, m in zip(rows[:, None], moves, strict=True)
-    ]
-    for (low, h0), (high, h1) in itertools.pairwise(zip(RING_LEVELS, heights, strict=True)):
-        if h1 - h0 < 0.01:
-            raise InputError(f"form: profile {high} comes to lie less than 1 cm above {low}; lower raise_cm")
-    between = np.arange(rows[0], rows[-1] + 1)
-    ids = layout.rings[between]
-    # Against height, not row number: the spacing of rows changes from one band to the next.
-    y = body[layout.rings[:, 0], 1]
-    out[ids] += PchipInterpolator(y[rows], np.stack(moves), axis=0)(y[between])
-    # The rings around both legs cut their corners: it is the legs that push a skirt out.
-    solid = np.unique(np.concatenate([ids.ravel(), *(grid.ravel() for grid in layout.legs.values())]))
-    row_of = {level: layout.level_row[level] for level in RING_LEVELS}
-    for pair in ruled:
-        if not set(pair) & {*ARM_LEVELS, *LEG_LEVELS}:
-            rule_rows(out, layout.rings, row_of, pair, body[solid])
 
 
 def _hang_below_belly(moves: list[FloatArray], body: FloatArray, layout: Layout, span: Sequence[int]) -> None:

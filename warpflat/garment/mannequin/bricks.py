@@ -92,28 +92,25 @@ def select_bricks(layout: Layout, patterns: Iterable[str]) -> list[str]:
         upper, dash, lower = band.partition("-")
         if not slash or not dash or not column:
             raise InputError(f"brick {pattern!r}: write upper-lower/column, as waist-hip/front-left-centre")
-        bands = _bands(upper, lower, pattern)
+        top = "shoulder" if upper == "neck" else upper
+        part = next((each for each in (TRUNK_LEVELS, ARM_LEVELS, LEG_LEVELS) if {top, lower} <= set(each)), None)
+        if (upper, lower) == ("collar", "neck"):
+            bands = {"collar-neck"}
+        elif part is not None:
+            i, j = part.index(top), part.index(lower)
+            if i >= j:
+                raise InputError(f"brick {pattern!r}: {upper} does not lie above {lower}; write the upper level first")
+            bands = {f"{a}-{b}" for a, b in itertools.pairwise(part[i : j + 1])}
+        else:
+            known = {"collar", "neck", *TRUNK_LEVELS, *ARM_LEVELS, *LEG_LEVELS}
+            for level in (upper, lower):
+                if level not in known:
+                    raise InputError(f"brick {pattern!r}: level {level!r} is unknown: {nearest(level, known)}")
+            words = f"{upper} and {lower} are not levels of one part (neck, trunk, arm, leg)"
+            raise InputError(f"brick {pattern!r}: {words}")
         columns = {name.partition("/")[2] for name in layout.bricks if name.partition("/")[0] in bands}
         matching = fnmatch.filter(columns, column)
         if not matching:
             raise InputError(f"brick {pattern!r}: no column {column!r} there: {nearest(column, columns)}")
         chosen |= {f"{b}/{c}" for b in bands for c in matching} & set(layout.bricks)
     return [name for name in layout.bricks if name in chosen]
-
-
-def _bands(upper: str, lower: str, pattern: str) -> set[str]:
-    """Return the bands of neighbouring levels between two levels."""
-    if (upper, lower) == ("collar", "neck"):
-        return {"collar-neck"}
-    for levels in (TRUNK_LEVELS, ARM_LEVELS, LEG_LEVELS):
-        top = "shoulder" if upper == "neck" else upper
-        if top in levels and lower in levels:
-            i, j = levels.index(top), levels.index(lower)
-            if i >= j:
-                raise InputError(f"brick {pattern!r}: {upper} does not lie above {lower}; write the upper level first")
-            return {f"{a}-{b}" for a, b in itertools.pairwise(levels[i : j + 1])}
-    known = {"collar", "neck", *TRUNK_LEVELS, *ARM_LEVELS, *LEG_LEVELS}
-    for level in (upper, lower):
-        if level not in known:
-            raise InputError(f"brick {pattern!r}: level {level!r} is unknown: {nearest(level, known)}")
-    raise InputError(f"brick {pattern!r}: {upper} and {lower} are not levels of one part (neck, trunk, arm, leg)")

@@ -128,7 +128,18 @@ def write_measurement_card(
         # Stature is measured beside the body, to its left.
         aside = float(views[""].low[0] + wide) + 0.03
         tapes["stature"] = np.array([(aside, share * mannequin.lengths["stature"], 0.0) for share in (0.0, 0.5, 1.0)])
-        tapes |= {name: _tape(mannequin, name) for name in needed if name not in tapes}
+        layout, at = mannequin.layout, mannequin.vertices
+        for name in (name for name in needed if name not in tapes):
+            if name in ("nape_to_waist", "armscye_depth"):
+                back, neck = layout.lines["centre back"], float(at[layout.lines["neck"], 1].max())
+                underarm = layout.lines["underarm left"][0]
+                low = at[layout.lines["waist"], 1].mean() if name == "nape_to_waist" else at[underarm, 1]
+                tapes[name] = at[back[(at[back, 1] <= neck) & (at[back, 1] >= low - 1e-6)]]
+            elif name == "bust_points":
+                ring = layout.rings[layout.level_row["bust"]]
+                tapes[name] = at[ring[np.arange(-layout.to_princess, layout.to_princess + 1) % len(ring)]]
+            else:
+                tapes[name] = at[layout.lines[TAKEN_ALONG[name]]]
         for drawn, is_behind in zip(bodies, (False, True), strict=True):
             view, names = drawn.view, [name for name in needed if (name in _BEHIND) is is_behind]
             lines = {name: drawn.to_page(tapes[name] @ view.directions.T) for name in names}
@@ -136,9 +147,9 @@ def write_measurement_card(
                 pen.line(line, width=1.6, colour=LINE, halo=True)
             for name, line in lines.items():
                 # A number lies on its tape: in the middle of a girth, half-way along a length, but where another one lies there.
-                at = {"bust_points": 0, "arm_length": 2 * len(line) // 3}
+                places = {"bust_points": 0, "arm_length": 2 * len(line) // 3}
                 closed = np.allclose(line[0], line[-1])
-                x, y = (line.min(axis=0) + line.max(axis=0)) / 2 if closed else line[at.get(name, len(line) // 2)]
+                x, y = (line.min(axis=0) + line.max(axis=0)) / 2 if closed else line[places.get(name, len(line) // 2)]
                 pen.badge(float(x), float(y), str(number[name]), LINE)
         row = min(0.27, 5.1 / max(len(number), 1))
         y = _TOP - _HEIGHT - 0.35
@@ -194,18 +205,3 @@ def _with_ends(mannequin: Mannequin) -> tuple[FloatArray, IntArray, dict[str, Fl
         faces.append(np.column_stack([corners + sum(map(len, vertices)), np.full(len(corners), -1)]))
         vertices.append(points)
     return np.concatenate(vertices), np.concatenate(faces).astype(np.int32), tapes
-
-
-def _tape(mannequin: Mannequin, name: str) -> FloatArray:
-    """Return the points along a tape (#P by 3 [m])."""
-    layout, at = mannequin.layout, mannequin.vertices
-    if name in ("nape_to_waist", "armscye_depth"):
-        back, neck = layout.lines["centre back"], float(at[layout.lines["neck"], 1].max())
-        low = (
-            at[layout.lines["waist"], 1].mean() if name == "nape_to_waist" else at[layout.lines["underarm left"][0], 1]
-        )
-        return at[back[(at[back, 1] <= neck) & (at[back, 1] >= low - 1e-6)]]
-    if name == "bust_points":
-        row = layout.rings[layout.level_row["bust"]]
-        return at[row[np.arange(-layout.to_princess, layout.to_princess + 1) % len(row)]]
-    return at[layout.lines[TAKEN_ALONG[name]]]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -102,6 +101,8 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
     Raises:
         InputError: the neckline takes a whole shoulder seam, or is so deep that the cloth folds below it.
     """
+    from scipy import sparse
+
     ids, laplacian, local = sheet_laplacian(layout, layout.level_row["bust"])
     quads = layout.faces[np.isin(layout.faces, ids).all(axis=1)]
     surface = _Surface(vertices, quads)
@@ -147,8 +148,17 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
     # Smooth as far as that keeps every quad upright; below a deep neckline each column of the grid is drawn together by itself instead.
     best, fewest = out, quads.size + 1
     for stiffness in _ALONG_COLUMNS:
+        operator = laplacian
+        if stiffness != 1.0:
+            # Upright edges weigh more.
+            pairs = (laplacian - sparse.diags(laplacian.diagonal())).tocoo()
+            edge = vertices[ids][pairs.row] - vertices[ids][pairs.col]
+            steep = edge[:, 1] ** 2 / (edge**2).sum(axis=1)
+            entries = 1.0 + (stiffness - 1.0) * steep, (pairs.row, pairs.col)
+            weights = sparse.coo_matrix(entries, laplacian.shape).tocsr()
+            operator = weights - sparse.diags(np.asarray(weights.sum(axis=1)).ravel())
         shift = out - vertices
-        fill_sheet(shift, layout, ids, _along_columns(laplacian, vertices[ids], stiffness)[local[moved]], local[moved])
+        fill_sheet(shift, layout, ids, operator[local[moved]], local[moved])
         placed, folded = laid(vertices + shift)
         if folded < fewest:
             best, fewest = placed, folded
@@ -172,19 +182,6 @@ def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> Floa
 def _centres(layout: Layout) -> dict[str, IntArray]:
     """Return the centre lines in front and behind, from the base of the neck down to the ankle."""
     return {face: layout.lines[f"centre {face}"][-len(layout.neck) :: -1] for face in ("front", "back")}
-
-
-def _along_columns(laplacian: Any, points: FloatArray, stiffness: float) -> Any:
-    """Return an umbrella operator in which upright edges weigh more, by a stiffness that is 1 as it is."""
-    from scipy import sparse
-
-    if stiffness == 1.0:
-        return laplacian
-    pairs = (laplacian - sparse.diags(laplacian.diagonal())).tocoo()
-    edge = points[pairs.row] - points[pairs.col]
-    upright = edge[:, 1] ** 2 / (edge**2).sum(axis=1)
-    weights = sparse.coo_matrix((1.0 + (stiffness - 1.0) * upright, (pairs.row, pairs.col)), laplacian.shape).tocsr()
-    return weights - sparse.diags(np.asarray(weights.sum(axis=1)).ravel())
 
 
 def _corners_upright(points: FloatArray, quads: IntArray, along: FloatArray | None = None) -> BoolArray:

@@ -290,28 +290,24 @@ def _lines(
         runs = joined_runs((inner[b, a], inner[a, b]) for a, b in itertools.pairwise(ids.tolist()) if (a, b) in inner)
         along = [edge for edge in edges if is_part_of(edge, line)]
         for run in sorted(runs, key=len, reverse=True):
-            whole, border = _with_edges(run, {edge: lines[edge].tolist() for edge in along})
-            lines[border or find_unused_name(line, lines)] = np.array(whole, np.int32)
+            # With what goes on at its ends as the same line; it has the first of their names.
+            joined: set[str] = set()
+            for edge in along * len(along):
+                if edge in joined or run[0] == run[-1]:
+                    continue
+                ids = lines[edge].tolist()
+                if run[0] in (ids[0], ids[-1]):
+                    run = [*(ids if ids[-1] == run[0] else ids[::-1]), *run[1:]]
+                elif run[-1] in (ids[0], ids[-1]):
+                    run = [*run, *(ids if ids[0] == run[-1] else ids[::-1])[1:]]
+                else:
+                    continue
+                joined.add(edge)
+            border = next((edge for edge in along if edge in joined), None)
+            lines[border or find_unused_name(line, lines)] = np.array(run, np.int32)
     return lines
 
 
 def is_part_of(name: str, line: str) -> bool:
     """Return whether a name is that of a feature line or of a further part of it."""
     return name == line or (name.startswith(f"{line} ") and name[len(line) + 1 :].isdigit())
-
-
-def _with_edges(run: list[int], edges: Mapping[str, list[int]]) -> tuple[list[int], str | None]:
-    """Return a run and what goes on at its ends, as one line; the first of the names that this has."""
-    joined: set[str] = set()
-    for name in list(edges) * len(edges):
-        ids = edges[name]
-        if name in joined or run[0] == run[-1]:
-            continue
-        if run[0] in (ids[0], ids[-1]):
-            run = [*(ids if ids[-1] == run[0] else ids[::-1]), *run[1:]]
-        elif run[-1] in (ids[0], ids[-1]):
-            run = [*run, *(ids if ids[0] == run[-1] else ids[::-1])[1:]]
-        else:
-            continue
-        joined.add(name)
-    return run, next((name for name in edges if name in joined), None)

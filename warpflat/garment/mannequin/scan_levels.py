@@ -77,7 +77,26 @@ def find_levels(
     """
     size, found = body.stature, _trunk_levels(body, noise, given)
     for name in ("knee", "calf", "ankle"):
-        sides = [_leg_level(body, name, side, noise) for side in ("left", "right")]
+        sides, y = list[ScanLevel](), body.legs.y
+        for side in ("left", "right"):
+            if name != "knee":
+                # Smoothed little, or the calf, which is rounder above than below, would be moved.
+                girth = smooth(body.legs.girths[side], 3.0 if noise else 1.0)
+                girth = -girth if name == "calf" else girth
+                sides.append(_least(body, name, y, girth, noise, "the legs do not show it", side=side))
+                continue
+            # Fat moves the skin over a knee: its crease behind, furthest inside the line from calf to thigh, then lies elsewhere.
+            back = smooth(np.array([hull[:, 1].min() for hull in body.legs.hulls[side]]), 3.0)
+            ends = [height_of("calf", body.vertices, side), 0.86 * body.crotch]
+            at = height_of("knee", body.vertices, side)
+            inside = back - np.interp(y, ends, np.interp(ends, y, back))
+            near = np.where(np.abs(y - at) < _CREASE * size, inside, -np.inf)
+            crease = summit(y, inside, int(np.argmax(near)))
+            if abs(crease - at) > _KNEE_SURE * size:
+                sides.append(ScanLevel(height=at, guess="the crease behind it lies elsewhere"))
+            else:
+                # Each is a few millimetres off the joint by itself.
+                sides.append(ScanLevel(height=0.5 * (at + crease), guess=unsure_of(noise)))
         guess = next((each.guess for each in sides if each.guess), None)
         found[f"leg_{name}"] = ScanLevel(height=0.5 * (sides[0].height + sides[1].height), guess=guess)
         if name != "calf":
@@ -182,24 +201,6 @@ def _trunk_levels(body: BodySections, noise: float, given: Mapping[str, float]) 
     beside = float(np.clip(beside, low + 0.008 * size, low + 0.035 * size))
     found["front_neck"], found["side_neck"] = ScanLevel(height=low), ScanLevel(height=beside)
     return found
-
-
-def _leg_level(body: BodySections, name: str, side: str, noise: float) -> ScanLevel:
-    """Return the level of a knee, calf or ankle on one leg."""
-    y, size = body.legs.y, body.stature
-    if name != "knee":
-        # Smoothed little, or the calf, which is rounder above than below, would be moved.
-        girth = smooth(body.legs.girths[side], 3.0 if noise else 1.0)
-        return _least(body, name, y, -girth if name == "calf" else girth, noise, "the legs do not show it", side=side)
-    # Fat moves the skin over a knee: its crease behind, furthest inside the line from calf to thigh, then lies elsewhere.
-    back = smooth(np.array([hull[:, 1].min() for hull in body.legs.hulls[side]]), 3.0)
-    ends, at = [height_of("calf", body.vertices, side), 0.86 * body.crotch], height_of("knee", body.vertices, side)
-    inside = back - np.interp(y, ends, np.interp(ends, y, back))
-    crease = summit(y, inside, int(np.argmax(np.where(np.abs(y - at) < _CREASE * size, inside, -np.inf))))
-    if abs(crease - at) > _KNEE_SURE * size:
-        return ScanLevel(height=at, guess="the crease behind it lies elsewhere")
-    # Each is a few millimetres off the joint by itself.
-    return ScanLevel(height=0.5 * (at + crease), guess=unsure_of(noise))
 
 
 def _noisy(noise: float) -> str:

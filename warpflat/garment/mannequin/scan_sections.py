@@ -135,6 +135,8 @@ class BodySections:
     """
 
     def __init__(self, vertices: FloatArray, laid: StandingBody, scan: Slicer, crotch: float) -> None:
+        from scipy.spatial import ConvexHull
+
         self.vertices, self.scan = vertices, scan
         #: The lowest point between the legs, and the height below which they are apart [m].
         self.lowest = float(vertices[laid.crotch, 1])
@@ -154,36 +156,8 @@ class BodySections:
 
         #: By side, trunk, leg and head without the arm.
         self.halves = {side: shown(part) for side, part in places.halves.items()}
-        self.trunk, self.legs = self._level_sections()
-        self.arms = dict[str, ArmSections]()
-        at_model = np.linspace(*_ARM, _ARM_COUNT)
-        for side, part in places.arms.items():
-            # An arm is sliced across the line through the middles of its vertices, and then of its sections.
-            line = np.array([value_at(near_place(float(at), side), vertices) for at in at_model])
-            arm = ArmSections(
-                slicer=Slicer(vertices, triangles[part]), scan=shown(part & ~places.halves[side]),
-                s=arc_lengths(line), line=line, way=_ways(line), elbow=0.0, wrist=0.0,
-            )  # fmt: skip
-            line = line.copy()
-            for i, (at, way) in enumerate(zip(arm.line, arm.way, strict=True)):
-                # Next to the armhole sections hold a part of the shoulder.
-                if i >= 4:
-                    cut = arm.cut(at, way)
-                    line[i] = 0.5 * (cut.min(axis=0) + cut.max(axis=0))
-            s = arc_lengths(line)
-            elbow, wrist = (float(np.interp(ARM_PLACES[name], at_model, s)) for name in ("elbow", "wrist"))
-            self.arms[side] = replace(arm, s=s, line=line, way=_ways(line), elbow=elbow, wrist=wrist)
-
-    def _level_sections(self) -> tuple[TrunkSections, LegSections]:
-        """Slice trunk and legs, the left and the right half by itself.
-
-        Raises:
-            InputError: if there is nothing of the body at some height.
-        """
-        from scipy.spatial import ConvexHull
-
-        stature = self.stature
-        heights = np.arange(0.04, 0.93, 0.0025) * stature
+        # Trunk and legs in level sections, the left and the right half by itself.
+        heights = np.arange(0.04, 0.93, 0.0025) * self.stature
         rows: list[list[float]] = []
         hulls: list[FloatArray] = []
         holed: list[bool] = []
@@ -207,23 +181,42 @@ class BodySections:
             z_front, z_back = float(flat[:, 1].max()), float(flat[:, 1].min())
             ahead = flat[flat[:, 1] > 0.5 * (z_front + z_back)]
             ahead = ahead[np.argsort(ahead[:, 0])]
-            outline = 0.5 * sum(np.interp(side * OUTLINES * stature, ahead[:, 0], ahead[:, 1]) for side in (1.0, -1.0))
+            outline = 0.5 * sum(
+                np.interp(side * OUTLINES * self.stature, ahead[:, 0], ahead[:, 1]) for side in (1.0, -1.0)
+            )
             rows.append([
                 hull.area, sum(p.length for p in parts), flat[:, 0].max(), -flat[:, 0].min(), z_front, z_back,
-                float(np.abs(flat[flat[:, 1] > z_front - 0.004 * stature][:, 0]).mean()), *outline,
+                float(np.abs(flat[flat[:, 1] > z_front - 0.004 * self.stature][:, 0]).mean()), *outline,
             ])  # fmt: skip
             hulls.append(flat[hull.vertices])
             holed.append(sum(p.patched for p in parts) > HOLED * rows[-1][1])
         table = np.array(rows).T
-        trunk = TrunkSections(
+        self.trunk = TrunkSections(
             y=heights, girth=table[0], length=table[1], left=table[2], right=table[3], front=table[4], back=table[5],
             apex=table[6], outlines=table[7:].T, hulls=tuple(hulls), holed=np.array(holed),
         )  # fmt: skip
-        legs = LegSections(
+        self.legs = LegSections(
             y=np.array(leg_heights), hulls={side: tuple(each) for side, each in of_legs.items()},
             girths={side: np.array(each) for side, each in girths.items()},
         )  # fmt: skip
-        return trunk, legs
+        self.arms = dict[str, ArmSections]()
+        at_model = np.linspace(*_ARM, _ARM_COUNT)
+        for side, part in places.arms.items():
+            # An arm is sliced across the line through the middles of its vertices, and then of its sections.
+            line = np.array([value_at(near_place(float(at), side), vertices) for at in at_model])
+            arm = ArmSections(
+                slicer=Slicer(vertices, triangles[part]), scan=shown(part & ~places.halves[side]),
+                s=arc_lengths(line), line=line, way=_ways(line), elbow=0.0, wrist=0.0,
+            )  # fmt: skip
+            line = line.copy()
+            for i, (at, way) in enumerate(zip(arm.line, arm.way, strict=True)):
+                # Next to the armhole sections hold a part of the shoulder.
+                if i >= 4:
+                    cut = arm.cut(at, way)
+                    line[i] = 0.5 * (cut.min(axis=0) + cut.max(axis=0))
+            s = arc_lengths(line)
+            elbow, wrist = (float(np.interp(ARM_PLACES[name], at_model, s)) for name in ("elbow", "wrist"))
+            self.arms[side] = replace(arm, s=s, line=line, way=_ways(line), elbow=elbow, wrist=wrist)
 
 
 def _ways(line: FloatArray) -> FloatArray:

@@ -39,6 +39,11 @@ def legs_from_measurements(m: Measurements, profile: Callable[[float], Profile])
         profile: the tube's profile at a height [m].
     """
     from scipy.interpolate import PchipInterpolator
+    from scipy.optimize import brentq
+
+    def miss(depth: float, width: float, girth: float) -> float:
+        section = Section(width=width, depth=depth, area=_AREA, front=0.5, shift=0.0)
+        return convex_girth(section_curve(section, AROUND_LEG)) - girth
 
     hip = profile(m.heights["hip"])
     front, back = float(hip.curve[0, 1]), float(hip.curve[len(hip.curve) // 2, 1])
@@ -55,7 +60,9 @@ def legs_from_measurements(m: Measurements, profile: Callable[[float], Profile])
         width = min(_WIDTH[level] * girth, outside - _BETWEEN)
         z = 0.5 * float(tube[:, 1].max() + tube[:, 1].min())
         ahead = _INSEAM_AHEAD * girth if level != "leg_thigh" else float(np.clip(point - z, -0.1 * girth, 0.1 * girth))
-        rows.append([girth, width, _depth(width, girth), outside - 0.5 * width, z, ahead])
+        # A tape around the section of that width and depth reads the girth.
+        depth = float(brentq(miss, 0.02 * girth, 0.6 * girth, args=(width, girth), xtol=1e-6))
+        rows.append([girth, width, depth, outside - 0.5 * width, z, ahead])
     smooth = PchipInterpolator(y, np.array(rows))
 
     @functools.cache
@@ -102,14 +109,3 @@ def crotch_curve(hip: float, crotch: float, front: float, back: float) -> FloatA
     t = np.linspace(0.0, np.pi, 200)
     z = 0.5 * (front + back) + 0.5 * (front - back) * np.cos(t)
     return np.column_stack([np.zeros_like(t), hip - (hip - crotch) * np.sin(t), z])
-
-
-def _depth(width: float, girth: float) -> float:
-    """Return the depth [m] of the section of a width whose tape reads `girth` [m]."""
-    from scipy.optimize import brentq
-
-    def miss(depth: float) -> float:
-        section = Section(width=width, depth=depth, area=_AREA, front=0.5, shift=0.0)
-        return convex_girth(section_curve(section, AROUND_LEG)) - girth
-
-    return float(brentq(miss, 0.02 * girth, 0.6 * girth, xtol=1e-6))

@@ -211,10 +211,19 @@ def read_garment(
             found.append(surface)
     if not found:
         raise faults[0] if faults else wrong_size(largest, file, scale)
-    bodies = [surface for surface in found if _is_body(surface, [other for other in found if other is not surface])]
-    for body in bodies:
+    # The body that wears the others is closed, without handles, as tall as one, and most of them lie on it.
+    bodies = list[Surface]()
+    for body in found:
         tall = float(np.ptp(body.vertices, axis=0).max())
-        notes.append(f"a body, {tall:.2f} m tall, left out: closed, and the rest lies around it")
+        if tall < _SHORTEST_BODY or not _is_closed(body):
+            continue
+        worn = [other.vertices for other in found if other is not body and not _is_closed(other)]
+        if not worn or euler_characteristic(body.faces) != 2:
+            continue
+        away = cKDTree(body.vertices).query(np.concatenate(worn))[0]
+        if float(np.median(away)) < _WORN:
+            bodies.append(body)
+            notes.append(f"a body, {tall:.2f} m tall, left out: closed, and the rest lies around it")
     found = [surface for surface in found if all(surface is not body for body in bodies)]
     layers = [Layer(surface.vertices, surface.faces) for surface in found]
     total = sum(layer.area for layer in layers)
@@ -249,17 +258,6 @@ def read_garment(
         )
     kept[0] = replace(kept[0], notes=tuple(dict.fromkeys([*notes, *kept[0].notes])))
     return GarmentFile(layers=tuple(kept), marks=tuple(marks), raw=raw, scale=scale)
-
-
-def _is_body(surface: Surface, others: Sequence[Surface]) -> bool:
-    """Return whether a layer is the body that wears the others: closed, without handles, as tall as one, and most of them lie on it."""
-    if np.ptp(surface.vertices, axis=0).max() < _SHORTEST_BODY or not _is_closed(surface):
-        return False
-    worn = [other.vertices for other in others if not _is_closed(other)]
-    if not worn or euler_characteristic(surface.faces) != 2:
-        return False
-    away = cKDTree(surface.vertices).query(np.concatenate(worn))[0]
-    return float(np.median(away)) < _WORN
 
 
 def _is_closed(surface: Surface) -> bool:

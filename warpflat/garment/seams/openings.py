@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -52,9 +52,31 @@ def _opened(cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy, options: SeamOption
     """Return the cloth with one tube opened along the first line of a tailor that does so; None if none does."""
     before, used = _tubes(mesh), np.unique(mesh.vertex_of)
     limbs = [limb for limb in anatomy.limbs if np.isin(anatomy.borders[limb.border].vertices, used).all()]
-    for name, level, cost in _lines(cloth, anatomy, [limb.kind for limb in limbs]):
-        made, _, own, lines = cloth.parted(level, cloth.marked(mesh.face_of))
-        parts = edge_components(made.new_edges(lines), ends=np.union1d(made.border_edges, made.seam_edges()))
+
+    def height(cloth: Cloth, edges: Ids) -> float:
+        return float((cloth.vertices[np.unique(edges)] @ anatomy.up).mean())
+
+    def beside(cloth: Cloth, edges: Ids) -> float:
+        return float(np.abs(anatomy.across(cloth.vertices[np.unique(edges)])).mean())
+
+    def behind(cloth: Cloth, edges: Ids, sign: float = 1.0) -> float:
+        facing = sign * float(cloth.values[FACING][np.unique(edges)].mean())
+        return facing if facing < 0.0 else np.inf
+
+    # Lines along which it may be opened, the best first: name, field, and what a part of the field's zero line costs.
+    kinds, lines = [limb.kind for limb in limbs], list[tuple[str, str, Cost]]()
+    if kinds == ["sleeve"]:
+        lines.append(("underarm", FACING, height))
+    if "leg" in kinds:
+        lines.append(("inseam", FACING, beside))
+    lines += [
+        ("centre back", LEFT, behind),
+        ("centre front", LEFT, partial(behind, sign=-1.0)),
+        ("side", FACING, lambda cloth, edges: -beside(cloth, edges)),
+    ]
+    for name, level, cost in lines:
+        made, _, own, along = cloth.parted(level, cloth.marked(mesh.face_of))
+        parts = edge_components(made.new_edges(along), ends=np.union1d(made.border_edges, made.seam_edges()))
         chosen = [(cost(made, part), part) for part in parts]
         for value, part in sorted(chosen, key=lambda one: one[0]):
             across = float(anatomy.across(made.vertices[np.unique(part)]).mean())
@@ -67,25 +89,3 @@ def _opened(cloth: Cloth, mesh: PieceMesh, anatomy: Anatomy, options: SeamOption
             if len(pieces) == 1 and _tubes(pieces[0]) < before:
                 return trial
     return None
-
-
-def _lines(cloth: Cloth, anatomy: Anatomy, limbs: list[str]) -> Iterator[tuple[str, str, Cost]]:
-    """Yield lines along which a tube may be opened, the best first: name, field, and what a part of its zero line costs."""
-
-    def height(cloth: Cloth, edges: Ids) -> float:
-        return float((cloth.vertices[np.unique(edges)] @ anatomy.up).mean())
-
-    def beside(cloth: Cloth, edges: Ids) -> float:
-        return float(np.abs(anatomy.across(cloth.vertices[np.unique(edges)])).mean())
-
-    def behind(cloth: Cloth, edges: Ids, sign: float = 1.0) -> float:
-        facing = sign * float(cloth.values[FACING][np.unique(edges)].mean())
-        return facing if facing < 0.0 else np.inf
-
-    if limbs == ["sleeve"]:
-        yield "underarm", FACING, height
-    if "leg" in limbs:
-        yield "inseam", FACING, beside
-    yield "centre back", LEFT, behind
-    yield "centre front", LEFT, partial(behind, sign=-1.0)
-    yield "side", FACING, lambda cloth, edges: -beside(cloth, edges)

@@ -215,40 +215,35 @@ def _strokes(piece: DraftedPiece, paper: OnPaper | None, *, nested: bool = False
     ]
     if nested:
         sewing = [replace(line, hidden=line.hidden or line.role not in ("dart", "fold")) for line in sewing]
-    return [*_cut_strokes(piece, open_folds=paper is not None), *sewing, *_detail_strokes(piece)]
-
-
-def _cut_strokes(piece: DraftedPiece, *, open_folds: bool) -> list[Stroke]:
-    """Return the cutting line; with `open_folds`, as what is cut and what lies on the fold, up to the cut edges."""
-    if not (open_folds and piece.fold_edges):
-        return [Stroke(role="cut", name="cut", points=piece.cut_line, closed=True)]
     ring = piece.cut_line
-    onwards = np.roll(ring, -1, axis=0)
-    on_fold = np.zeros(len(ring), dtype=bool)
-    for edge in piece.fold_edges:
-        start, end = edge.line[[0, -1]]
-        along = unit(end - start)
-        away = [np.abs((points - start) @ [-along[1], along[0]]) for points in (ring, onwards)]
-        on_fold |= np.maximum(*away) < ON_FOLD
-    if not on_fold.any() or on_fold.all():
-        whole = Stroke(role="cut", name="cut", points=ring, closed=True)
-        return [whole, *(stroke for edge in piece.fold_edges for stroke in _edge_strokes(piece, edge))]
-    first = next(k for k in range(len(ring)) if on_fold[k - 1] and not on_fold[k])
-    order = np.roll(np.arange(len(ring)), -first)
-    changes = [k for k in range(len(ring)) if on_fold[order[k]] != on_fold[order[k - 1]]]
-    strokes = []
-    for number, (a, b) in enumerate(zip(changes, [*changes[1:], len(ring)], strict=True)):
-        points = ring[order[np.arange(a, b + 1) % len(ring)]]
-        folded = bool(on_fold[order[a]])
-        name = piece.fold_edges[0].name if folded else "cut"
-        strokes.append(
-            Stroke(
-                role="fold" if folded else "cut",
-                name=name if number < 2 else f"{name} {number // 2 + 1}",
-                points=points,
-            )
-        )
-    return strokes
+    cut = [Stroke(role="cut", name="cut", points=ring, closed=True)]
+    if paper is not None and piece.fold_edges:
+        # On paper it is what is cut and what lies on the fold, up to the cut edges.
+        onwards = np.roll(ring, -1, axis=0)
+        on_fold = np.zeros(len(ring), dtype=bool)
+        for edge in piece.fold_edges:
+            start, end = edge.line[[0, -1]]
+            along = unit(end - start)
+            away = [np.abs((points - start) @ [-along[1], along[0]]) for points in (ring, onwards)]
+            on_fold |= np.maximum(*away) < ON_FOLD
+        if not on_fold.any() or on_fold.all():
+            cut += [stroke for edge in piece.fold_edges for stroke in _edge_strokes(piece, edge)]
+        else:
+            first = next(k for k in range(len(ring)) if on_fold[k - 1] and not on_fold[k])
+            order = np.roll(np.arange(len(ring)), -first)
+            changes = [k for k in range(len(ring)) if on_fold[order[k]] != on_fold[order[k - 1]]]
+            cut = []
+            for number, (a, b) in enumerate(zip(changes, [*changes[1:], len(ring)], strict=True)):
+                folded = bool(on_fold[order[a]])
+                name = piece.fold_edges[0].name if folded else "cut"
+                cut.append(
+                    Stroke(
+                        role="fold" if folded else "cut",
+                        name=name if number < 2 else f"{name} {number // 2 + 1}",
+                        points=ring[order[np.arange(a, b + 1) % len(ring)]],
+                    )
+                )
+    return [*cut, *sewing, *_detail_strokes(piece)]
 
 
 def _edge_strokes(piece: DraftedPiece, edge: DraftedEdge) -> list[Stroke]:
@@ -353,7 +348,24 @@ class _Annotations:
                 named.append((edge.name, edge.line, "left"))
         named += [(name, fisheye_legs(line)[0][::-1], "left") for name, line in piece.fisheyes.items()]
         drawn = [shapely.LineString(line) for _, line, _ in named]
-        self._name_lines(named, drawn)
+        # Names stand along their lines, each clear of the other lines.
+        own, called = piece.piece, {name for name, _, _ in named}
+        for index, (name, line, side) in enumerate(named):
+            # A lower edge is a hem for a sewer, turned up or raw, whatever level of the body it lies at; vents and wraps keep theirs.
+            words, kinds = set(name.split(" ")), [edge.kind for edge in piece.edges if edge.name == name]
+            lower = "hem" in kinds or ("cut" in kinds and HEMMED_LEVELS & words)
+            kind = "hem" if lower and not {"vent", "slit", "wrap"} & words else name_without_number(name, called)
+            # One of a pair is neither left nor right, as in the sewing order.
+            text = name_in_units(translate_name(without_side(kind) if own.is_pair else kind), own.units)
+            width = text_width(text, NAME)
+            if polyline_length(line) < width + (0.008 if side == "left" else 0.02):
+                continue
+            others = [*drawn[:index], *drawn[index + 1 :]]
+            # Beside an edge, as a zip is, a name may have room on one side alone.
+            for which in (side, "either") if side == "above" else (side,):
+                spots = spots_along(line, width, NAME_GAP, shares=NAME_SHARES, side=which)
+                if self._write(text, NAME, spots, avoid=others, least=CLEAR, enough=WELL_CLEAR):
+                    break
         self._name_buttons(drawn)
         if paper is not None:
             self._letter_notches(paper.letters, beyond, slits)
@@ -395,26 +407,6 @@ class _Annotations:
         if self._paper is not None:
             self._room.take(beyond)
         return beyond
-
-    def _name_lines(self, named: Sequence[tuple[str, FloatArray, str]], drawn: Sequence[Geometry]) -> None:
-        """Write the names of lines along them, each clear of the other lines."""
-        piece, called = self._piece.piece, {name for name, _, _ in named}
-        for index, (name, line, side) in enumerate(named):
-            # A lower edge is a hem for a sewer, turned up or raw, whatever level of the body it lies at; vents and wraps keep theirs.
-            words, kinds = set(name.split(" ")), [edge.kind for edge in self._piece.edges if edge.name == name]
-            lower = "hem" in kinds or ("cut" in kinds and HEMMED_LEVELS & words)
-            kind = "hem" if lower and not {"vent", "slit", "wrap"} & words else name_without_number(name, called)
-            # One of a pair is neither left nor right, as in the sewing order.
-            text = name_in_units(translate_name(without_side(kind) if piece.is_pair else kind), piece.units)
-            width = text_width(text, NAME)
-            if polyline_length(line) < width + (0.008 if side == "left" else 0.02):
-                continue
-            others = [*drawn[:index], *drawn[index + 1 :]]
-            # Beside an edge, as a zip is, a name may have room on one side alone.
-            for which in (side, "either") if side == "above" else (side,):
-                spots = spots_along(line, width, NAME_GAP, shares=NAME_SHARES, side=which)
-                if self._write(text, NAME, spots, avoid=others, least=CLEAR, enough=WELL_CLEAR):
-                    break
 
     def _name_buttons(self, drawn: Sequence[Geometry]) -> None:
         """Name the first button and the first buttonhole of a row, which are too short for a name along them."""

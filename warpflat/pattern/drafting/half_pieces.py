@@ -183,9 +183,20 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
         placement=None,
         levels={},
     )
-    on_side = _notches_beside(piece, garment.garment.seams, names, axis, side)
-    notches = tuple(_on_half(notch, moved, shift, side) for notch in on_side)
-    return draft_half(half, garment.name, (*moved, drafted), notches, piece.notes)
+    # Each notch moves with the half, on which it gets the nearest edge.
+    notches = []
+    for notch in _notches_beside(piece, garment.garment.seams, names, axis, side):
+        at, bases, slit = notch.at + shift, [base + shift for base in notch.base], notch.direction
+        place = shapely.Point(at)
+        nearest = min(moved, key=lambda edge: float(shapely.LineString(edge.line).distance(place)))
+        if abs(at[0]) <= SYMMETRIC and len(bases) == 1:
+            # Its slit runs along the fold, x = 0.
+            upright = np.array([0.0, 1.0])
+            at, bases, slit = at * upright, [bases[0] * upright], np.sign(slit[1]) * upright
+        # Of a double notch on the fold one slit is the other's mirror image.
+        bases = [base for base in bases if side * base[0] >= -SYMMETRIC]
+        notches.append(replace(notch, edge=nearest.name, at=at, base=tuple(bases), direction=slit))
+    return draft_half(half, garment.name, (*moved, drafted), tuple(notches), piece.notes)
 
 
 def _notches_beside(
@@ -209,21 +220,6 @@ def _notches_beside(
             bases = tuple(base * flip + moved_by for base in notch.base)
             on_side.append(replace(notch, at=notch.at * flip + moved_by, base=bases, direction=notch.direction * flip))
     return on_side
-
-
-def _on_half(notch: Notch, edges: Sequence[DraftedEdge], shift: FloatArray, side: float) -> Notch:
-    """Return a notch on the nearest edge of the half, moved with it."""
-    import shapely
-
-    at, bases, direction = notch.at + shift, [base + shift for base in notch.base], notch.direction
-    nearest = min(edges, key=lambda edge: float(shapely.LineString(edge.line).distance(shapely.Point(at))))
-    if abs(at[0]) <= SYMMETRIC and len(bases) == 1:
-        # Its slit runs along the fold, x = 0.
-        upright = np.array([0.0, 1.0])
-        at, bases, direction = at * upright, [bases[0] * upright], np.sign(direction[1]) * upright
-    # Of a double notch on the fold one slit is the other's mirror image.
-    bases = [base for base in bases if side * base[0] >= -SYMMETRIC]
-    return replace(notch, edge=nearest.name, at=at, base=tuple(bases), direction=direction)
 
 
 def _clipped(control: FloatArray, axis: float, side: float) -> FloatArray | None:

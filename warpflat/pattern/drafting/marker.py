@@ -177,13 +177,26 @@ def make_marker(
     # In the order in which the cutter meets them.
     placements = sorted(placements, key=lambda copy: tuple(copy.cut_line.min(axis=0)))
     with printed_in(garment.garment.words):
-        named = tuple(_named(copy) for copy in placements)
+        # Each gets its name in the room between its lines.
+        for number, copy in enumerate(placements):
+            piece = copy.piece
+            rows = [(piece.piece.printed_name, NAME)]
+            rows += [(printed_size(piece.size), MORE)] if piece.size else []
+            rows += [(translate("mirrored"), MORE)] if copy.mirrored else []
+            lines = [*copy.fold_lines, copy.grain, *copy.notches]
+            for clearance in CLEARANCES:
+                keep_off = [shapely.LineString(line).buffer(clearance) for line in lines]
+                keep_off += [shapely.Polygon(line).buffer(clearance) for line in copy.cutouts]
+                room = shapely.Polygon(copy.cut_line).buffer(-clearance).difference(shapely.union_all(keep_off))
+                if (name := fit_label(room, rows, least=LEAST)) is not None:
+                    break
+            placements[number] = replace(copy, name=name)
     marker = Marker(
         name=garment.name,
         fabric=fabric,
         width=cloth.lay_width,
-        length=_length(named) + cloth.gap,
-        placements=named,
+        length=_length(placements) + cloth.gap,
+        placements=tuple(placements),
         folded=cloth.folded,
     )
     # Copies do not overlap and lie on the cloth, whatever the solver says.
@@ -334,24 +347,6 @@ def _placed(piece: DraftedPiece, mirrored: bool, matrix: FloatArray, *, half: bo
         name=None,
         notches=tuple(map(moved, slits)),
     )
-
-
-def _named(copy: Copy) -> Copy:
-    """Return a copy with its name in the room between its lines."""
-    import shapely
-
-    piece = copy.piece
-    rows = [(piece.piece.printed_name, NAME)]
-    rows += [(printed_size(piece.size), MORE)] if piece.size else []
-    rows += [(translate("mirrored"), MORE)] if copy.mirrored else []
-    lines = [*copy.fold_lines, copy.grain, *copy.notches]
-    for clearance in CLEARANCES:
-        keep_off = [shapely.LineString(line).buffer(clearance) for line in lines]
-        keep_off += [shapely.Polygon(line).buffer(clearance) for line in copy.cutouts]
-        room = shapely.Polygon(copy.cut_line).buffer(-clearance).difference(shapely.union_all(keep_off))
-        if (name := fit_label(room, rows, least=LEAST)) is not None:
-            break
-    return replace(copy, name=name)
 
 
 #: Widths [m] at which cloth is sold.

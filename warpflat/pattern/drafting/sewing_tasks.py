@@ -346,7 +346,21 @@ class SewingTasks:
         for task in self.tasks:
             if task.technique == "at_zip":
                 task.places = [place for each in zips for place in each.sewn]
-        self._finish_strips()
+        ruffles = [name for name in self._with_role("strip") if self._has_hem(name)]
+        self._add("ruffle_hem", ruffles, self._take_of(ruffles, ("hem",)))
+        pleated = [name for name in ruffles if self.pieces[name].pleats]
+        self._add("ruffle_pleats", pleated)
+        longer = {s.piece for seam in self.seams if seam.ease > GATHERED for s in seam.sides[1]}
+        self._add("ruffle_gathers", [name for name in ruffles if name in longer and name not in pleated])
+        hems = self._take_of(self._with_role("hood"), ("hem",))
+        width = max((self.pieces[p].edge(e).width for p, e in hems), default=0.0)
+        self._add("hood_hem", [], hems, width=length_words(width, self.units))
+        # What their own seam to the garment leaves of strips, collars and facings goes with that.
+        for name in self._with_role("facing", "strip", "waistband", "cuff", "collar", "hood"):
+            places = [(p, e) for (p, e), kind in self._free.items() if p == name and kind != "hem"]
+            on = [t for t in self.tasks if t.how.get("takes_edges") and name in pieces_of(t.sewn)]
+            if on and places:
+                max(on, key=lambda task: int(task.how["turn"])).uses.extend(self._take(places))
         # Vents and slits, in the shell and in its lining.
         role = {name: piece.role for name, piece in self.pieces.items()}
         for kind in ("vent", "slit"):
@@ -413,23 +427,6 @@ class SewingTasks:
         for task in self.tasks:
             if task.technique == "fly":
                 task.pieces, task.uses = fly, places
-
-    def _finish_strips(self) -> None:
-        """Add ruffles and hems of hoods; what their own seam to the garment leaves of strips, collars and facings goes with that."""
-        ruffles = [name for name in self._with_role("strip") if self._has_hem(name)]
-        self._add("ruffle_hem", ruffles, self._take_of(ruffles, ("hem",)))
-        pleated = [name for name in ruffles if self.pieces[name].pleats]
-        self._add("ruffle_pleats", pleated)
-        longer = {s.piece for seam in self.seams if seam.ease > GATHERED for s in seam.sides[1]}
-        self._add("ruffle_gathers", [name for name in ruffles if name in longer and name not in pleated])
-        hems = self._take_of(self._with_role("hood"), ("hem",))
-        width = max((self.pieces[p].edge(e).width for p, e in hems), default=0.0)
-        self._add("hood_hem", [], hems, width=length_words(width, self.units))
-        for name in self._with_role("facing", "strip", "waistband", "cuff", "collar", "hood"):
-            places = [(p, e) for (p, e), kind in self._free.items() if p == name and kind != "hem"]
-            on = [t for t in self.tasks if t.how.get("takes_edges") and name in pieces_of(t.sewn)]
-            if on and places:
-                max(on, key=lambda task: int(task.how["turn"])).uses.extend(self._take(places))
 
     def _thread(self, elastic: Elastic) -> None:
         """Add an elastic, in a casing or a folded band, with its notion."""

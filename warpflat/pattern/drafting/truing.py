@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,7 +88,23 @@ def true_corners(
     import shapely
 
     start = dict(curves)
-    found = {frozenset(corner.ends): corner for corner in _corners(pieces, seams)}
+    # The corners at both ends of every seam and every fold, and at the mouth of every dart.
+    found = dict[frozenset[tuple[End, End]], _Corner]()
+    by_name = {piece.name: piece for piece in pieces}
+    lines: list[tuple[str, Sequence[Sequence[SeamSide]]]]
+    lines = [(seam.name, seam.sides) for seam in (*seams, *(dart for piece in pieces for dart in piece.dart_seams))]
+    lines += [
+        (f"{piece.name}.{edge.name}", ((SeamSide(piece=piece.name, edge=edge.name),),))
+        for piece in pieces
+        for edge in piece.edges
+        if edge.kind == "fold"
+    ]
+    for name, rows in lines:
+        for last in (False, True):
+            joined = [row[-1 if last else 0] for row in rows]
+            corner = _corner_between(by_name, name, [(side, last != side.reversed) for side in joined])
+            if corner is not None:
+                found[frozenset(corner.ends)] = corner
     away = {corner: abs(corner.angle(start) - corner.wanted) for corner in found.values()}
     corners = [corner for corner in found.values() if away[corner] < MEANT]
     shares = np.array([min(1.0, (MEANT - away[corner]) / (MEANT - DOUBTED)) for corner in corners])
@@ -158,25 +174,6 @@ def _least_turns(corners: Sequence[_Corner], shares: FloatArray, curves: Mapping
     system = np.concatenate([weights[:, None] * rates * free, np.sqrt(SMALL) * np.eye(len(ends))])
     solved = free * np.linalg.lstsq(system, np.concatenate([weights * missing, np.zeros(len(ends))]), rcond=None)[0]
     return {end: float(turn) for end, turn in zip(ends, solved, strict=True) if abs(turn) > LEAST_TURN}
-
-
-def _corners(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[_Corner]:
-    """Yield the corners at both ends of every seam and every fold, and at the mouth of every dart."""
-    by_name = {piece.name: piece for piece in pieces}
-    lines: list[tuple[str, Sequence[Sequence[SeamSide]]]]
-    lines = [(seam.name, seam.sides) for seam in (*seams, *(dart for piece in pieces for dart in piece.dart_seams))]
-    lines += [
-        (f"{piece.name}.{edge.name}", ((SeamSide(piece=piece.name, edge=edge.name),),))
-        for piece in pieces
-        for edge in piece.edges
-        if edge.kind == "fold"
-    ]
-    for name, rows in lines:
-        for last in (False, True):
-            sides = [row[-1 if last else 0] for row in rows]
-            corner = _corner_between(by_name, name, [(side, last != side.reversed) for side in sides])
-            if corner is not None:
-                yield corner
 
 
 def _corner_between(pieces: Mapping[str, Piece], line: str, sides: Sequence[tuple[SeamSide, bool]]) -> _Corner | None:

@@ -364,6 +364,50 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
     """
     pattern, sample = garment.garment, next(iter(garment.pieces.values()))
     darts = [seam for piece in sample for seam in piece.piece.dart_seams]
+    sizes = dict[str, dict[str, Any]]()
+    for size, pieces in garment.pieces.items():
+        entries = sizes.setdefault(size, {})
+        for piece in pieces:
+            own, label = piece.piece, piece.label
+            edges = [
+                _told(
+                    EdgeEntry,
+                    edge,
+                    name=edge.name,
+                    kind=edge.kind,
+                    allowance=edge.width,
+                    length=edge.length,
+                    point_lengths=edge.places.tolist(),
+                    **_told(EdgeEntry, edge.curve),
+                )
+                for edge in piece.edges
+            ]
+            legs = []
+            for dart in piece.darts:
+                lengths = [1000 * piece.edge(leg).length for leg in (dart.dart.left, dart.dart.right)]
+                legs.append({**_told(DartEntry, dart.dart), **_told(DartEntry, dart, length_mm=lengths)})
+            drafted = _told(
+                PieceEntry,
+                piece,
+                edges=edges,
+                darts=legs,
+                notches=[_told(NotchEntry, notch, double=notch.double) for notch in piece.notches],
+                cutouts={name: cutout.cut_line.tolist() for name, cutout in piece.cutouts.items()},
+                cutout_sew_lines={name: cutout.sew_line.tolist() for name, cutout in piece.cutouts.items()},
+                cutout_allowances={name: cutout.width for name, cutout in piece.cutouts.items()},
+                fisheye_darts=_plain(piece.fisheyes),
+                label=_told(
+                    LabelEntry, label, lines=[t for t, _ in label.lines], heights=[height for _, height in label.lines]
+                ),
+            )
+            entries[piece.name] = _told(
+                PieceEntry,
+                own,
+                marks=sorted(own.marks),
+                printed_units=own.units,
+                on_fold=own.on_fold,
+                **drafted,
+            )
     return {
         "schema": SCHEMA,
         "warpflat": __version__,
@@ -371,7 +415,7 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
         "name": garment.name,
         "sample_size": pattern.sample,
         "words": dict(pattern.words),
-        "sizes": {size: {piece.name: _piece(piece) for piece in pieces} for size, pieces in garment.pieces.items()},
+        "sizes": sizes,
         "cut_list": {size: _plain(cut_list(pieces)) for size, pieces in garment.pieces.items()},
         "stitches": [
             *(_stitch(seam, "seam") for seam in pattern.seams),
@@ -414,42 +458,6 @@ def _stitch(seam: Seam, kind: str) -> dict[str, Any]:
         [_told(SideEntry, side, **({"copy": side.copy} if side.copy else {})) for side in row] for row in seam.sides
     ]
     return _told(StitchEntry, seam, kind=kind, sides=sides)
-
-
-def _piece(piece: DraftedPiece) -> dict[str, Any]:
-    own, label = piece.piece, piece.label
-    edges = [
-        _told(
-            EdgeEntry,
-            edge,
-            name=edge.name,
-            kind=edge.kind,
-            allowance=edge.width,
-            length=edge.length,
-            point_lengths=edge.places.tolist(),
-            **_told(EdgeEntry, edge.curve),
-        )
-        for edge in piece.edges
-    ]
-    darts = []
-    for dart in piece.darts:
-        lengths = [1000 * piece.edge(leg).length for leg in (dart.dart.left, dart.dart.right)]
-        darts.append({**_told(DartEntry, dart.dart), **_told(DartEntry, dart, length_mm=lengths)})
-    drafted = _told(
-        PieceEntry,
-        piece,
-        edges=edges,
-        darts=darts,
-        notches=[_told(NotchEntry, notch, double=notch.double) for notch in piece.notches],
-        cutouts={name: cutout.cut_line.tolist() for name, cutout in piece.cutouts.items()},
-        cutout_sew_lines={name: cutout.sew_line.tolist() for name, cutout in piece.cutouts.items()},
-        cutout_allowances={name: cutout.width for name, cutout in piece.cutouts.items()},
-        fisheye_darts=_plain(piece.fisheyes),
-        label=_told(
-            LabelEntry, label, lines=[t for t, _ in label.lines], heights=[height for _, height in label.lines]
-        ),
-    )
-    return _told(PieceEntry, own, marks=sorted(own.marks), printed_units=own.units, on_fold=own.on_fold, **drafted)
 
 
 def read_pattern_json(path: str | os.PathLike[str]) -> DraftedGarment:

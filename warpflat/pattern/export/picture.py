@@ -139,7 +139,24 @@ def draw_figure(
     density = np.concatenate([np.asarray(piece.face_energy_density, dtype=np.float64) for piece in pieces])
     areas = np.concatenate([face_areas(piece.surface.vertices, piece.surface.faces) for piece in pieces])
     colours = Scale(high=energy_scale(density, areas) if scale is None else scale)
-    cells = [_cell(piece, names[piece.name], colours, shows_body=body is None) for piece in pieces]
+    cells = list[_Cell]()
+    for piece in pieces:
+        faces = np.asarray(piece.faces, dtype=np.int32)
+        in_plane, views = Facets.of(faces), dict[str, View]()
+        if body is None:
+            in_space = piece.surface.lines if piece.surface_lines is None else piece.surface_lines
+            on_body = in_plane if np.array_equal(faces, piece.surface.faces) else Facets.of(piece.surface.faces)
+            views["on the body"] = View.of_surface(piece.surface, on_body, polylines_of(in_space))
+        positions = np.asarray(piece.positions, dtype=np.float64)
+        views["pattern" if body is None else ""] = View.of_pattern(positions, in_plane, polylines_of(piece.lines))
+        shades = colours.rgb(np.asarray(piece.face_energy_density, dtype=np.float64))
+        cell = _Cell(
+            name=names[piece.name], captions=dict(piece.captions), colours=shades, views=views,
+            datum=piece.datum, grain_angle=piece.grain_angle,
+        )  # fmt: skip
+        wide, tall = cell.extent
+        cell.stacked = body is None and float(wide) > _STACKED * float(tall)
+        cells.append(cell)
     if len(cells) == 1 and body is None:
         cells[0].narrowest = _NARROWEST_PAGE - 2 * MARGIN
     pen = Pen(PAGE_WIDTH, 4.0)
@@ -273,26 +290,6 @@ class _Cell:
     def head(self) -> float:
         """How far the views are below the upper edge [in]."""
         return self.words + (_HEADING if len(self.views) > 1 else _NAMED)
-
-
-def _cell(piece: PicturePiece, title: str, scale: Scale, *, shows_body: bool) -> _Cell:
-    """Return the cell of a piece, with its views."""
-    faces = np.asarray(piece.faces, dtype=np.int32)
-    in_plane, views = Facets.of(faces), dict[str, View]()
-    if shows_body:
-        in_space = piece.surface.lines if piece.surface_lines is None else piece.surface_lines
-        on_body = in_plane if np.array_equal(faces, piece.surface.faces) else Facets.of(piece.surface.faces)
-        views["on the body"] = View.of_surface(piece.surface, on_body, polylines_of(in_space))
-    positions = np.asarray(piece.positions, dtype=np.float64)
-    views["pattern" if shows_body else ""] = View.of_pattern(positions, in_plane, polylines_of(piece.lines))
-    colours = scale.rgb(np.asarray(piece.face_energy_density, dtype=np.float64))
-    cell = _Cell(
-        name=title, captions=dict(piece.captions), colours=colours, views=views,
-        datum=piece.datum, grain_angle=piece.grain_angle,
-    )  # fmt: skip
-    width, height = cell.extent
-    cell.stacked = shows_body and float(width) > _STACKED * float(height)
-    return cell
 
 
 class _Band:

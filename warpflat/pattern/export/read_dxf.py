@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
@@ -106,7 +106,12 @@ def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) ->
         document: Any = recover.readfile(str(path))[0]
         space = document.modelspace()
         layouts = [("", space), *((block.name, block) for block in document.blocks if not block.name.startswith("*"))]
-        texts = [text for _, entities in layouts for text in _words(entities)]
+        texts = [
+            str(entity.dxf.text if entity.dxftype() == "TEXT" else entity.plain_text())
+            for _, entities in layouts
+            for entity in entities
+            if entity.dxftype() in ("TEXT", "MTEXT")
+        ]
         units = next(
             (value for key, _, value in (text.partition(":") for text in texts) if key.strip().upper() == "UNITS"), ""
         )
@@ -162,13 +167,6 @@ def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) ->
             if len(own) < len(sizes):
                 notes.append(f"piece {quote_value(name)} is in size {', '.join(own)} only")
         return replace(pattern, notes=notes)
-
-
-def _words(entities: Iterable[Any]) -> Iterator[str]:
-    """Yield the texts of a block, as they are written."""
-    for entity in entities:
-        if entity.dxftype() in ("TEXT", "MTEXT"):
-            yield str(entity.dxf.text if entity.dxftype() == "TEXT" else entity.plain_text())
 
 
 def _read_block(name: str, entities: Iterable[Any], insert: Any, metres: float, most: int, place: Place) -> _Block:

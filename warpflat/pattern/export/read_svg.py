@@ -85,7 +85,29 @@ def read_svg(path: str | os.PathLike[str], *, allowance: float | None = None) ->
     path = Path(path)
     with reading(path, "SVG") as place:
         root = _parse(path)
-        page, sides = _page(root)
+        # The matrix from units of the drawing to metres, y upwards, and the sides of the page [m], if the file has them.
+        pixel = _MILLIMETRES["px"]
+        given = [_LENGTH.fullmatch(root.get(key, "")) for key in _SIDES]
+        lengths = [
+            float(found[1]) * _MILLIMETRES[found[2]] if found and found[2] in _MILLIMETRES else None for found in given
+        ]
+        box = root.get("viewBox", "").replace(",", " ").split()
+        scale = [pixel, pixel]
+        sides: tuple[float, float] | None = None
+        if len(box) == 4:
+            view = [float(word) for word in box[2:]]
+            both = [side for side in lengths if side is not None]
+            if lengths[0] is not None or lengths[1] is not None:
+                if not all(0.0 < number < np.inf for number in (*both, *view)):
+                    told = " and ".join(f"{key} {quote_value(root.get(key))}" for key in _SIDES if root.get(key))
+                    raise InputError(f"{told} and viewBox {quote_value(' '.join(box))} must be numbers above 0")
+                ratios = [side / wide for side, wide in zip(lengths, view, strict=True) if side is not None]
+                stretched = root.get("preserveAspectRatio", "").strip() == "none" and len(ratios) == 2
+                scale = ratios if stretched else [min(ratios)] * 2
+            sides = 1e-3 * scale[0] * view[0], 1e-3 * scale[1] * view[1]
+        elif lengths[0] is not None and lengths[1] is not None:
+            sides = 1e-3 * lengths[0], 1e-3 * lengths[1]
+        page = 1e-3 * np.array([[scale[0], 0.0, 0.0], [0.0, -scale[1], 0.0]])
         drawing = _Drawing(root)
         groups = [(element, matrix) for element, matrix in drawing.walk(page) if "data-piece" in element.attrib]
         pieces, words = list[Piece](), dict[str, list[tuple[str, str, str]]]()
@@ -339,9 +361,39 @@ class _Drawing:
         Raises:
             InputError: a coordinate is no number or far off, or the drawing has too many points.
         """
+        from fontTools.pens.recordingPen import RecordingPen  # type: ignore[import-untyped]
+        from fontTools.svgLib.path import parse_path  # type: ignore[import-untyped]
+
         text = _path_data(element)
+        if not text.strip():
+            return []
+        # Curves lie within `CHORD` of their chords, by the length of the drawing's unit [m].
         scale = float(np.linalg.norm(matrix[:, :2], 2))
-        found = list(_flatten(text, scale)) if text.strip() else []
+        logging.getLogger("fontTools").addHandler(logging.NullHandler())
+        pen: Any = RecordingPen()
+        parse_path(text, pen)
+        parts: list[FloatArray] = []
+        found, count = list[tuple[FloatArray, bool]](), 0
+        for command, args in pen.value:
+            control = [np.array(point, dtype=np.float64) for point in args]
+            pieces = 1
+            if command in ("curveTo", "qCurveTo"):
+                curve = as_cubic(np.array([parts[-1][-1], *control]))
+                bend = scale * float(np.linalg.norm(np.diff(curve, n=2, axis=0), axis=1).max())
+                pieces = int(np.clip(np.ceil(np.sqrt(0.75 * bend / CHORD)), 1, _MOST_CHORDS)) if bend < FARTHEST else 1
+            count += pieces
+            if count > MOST_POINTS:
+                raise InputError(TOO_MANY)
+            if command == "moveTo":
+                parts = [control[0][None]]
+            elif command == "lineTo":
+                parts.append(control[0][None])
+            elif command in ("curveTo", "qCurveTo"):
+                parts.append(cubic_weights(np.linspace(0.0, 1.0, pieces + 1)[1:]) @ curve)
+            else:
+                line = np.concatenate(parts)
+                ends_meet = bool(np.linalg.norm(line[0] - line[-1]) < 1e-6)
+                found.append((line, command == "closePath" or ends_meet))
         lines, alone = list[DrawnLine](), len(found) == 1
         for points, closed in found:
             points = points[np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-9])]
@@ -390,31 +442,6 @@ def _length(element: ET.Element, key: str, otherwise: str = "0") -> float:
     if found is None or found[2] not in _MILLIMETRES:
         raise InputError(f"{key} is {quote_value(text)}; it must be a length, such as 10 or 10mm")
     return float(found[1]) * (_MILLIMETRES[found[2]] / _MILLIMETRES["px"] if found[2] else 1.0)
-
-
-def _page(root: ET.Element) -> tuple[FloatArray, tuple[float, float] | None]:
-    """Return the matrix from units of the drawing to metres, y upwards, and the sides of the page [m], if the file has them."""
-    pixel = _MILLIMETRES["px"]
-    given = [_LENGTH.fullmatch(root.get(key, "")) for key in _SIDES]
-    sides = [
-        float(found[1]) * _MILLIMETRES[found[2]] if found and found[2] in _MILLIMETRES else None for found in given
-    ]
-    box = root.get("viewBox", "").replace(",", " ").split()
-    scale, page = [pixel, pixel], None
-    if len(box) == 4:
-        view = [float(word) for word in box[2:]]
-        both = [side for side in sides if side is not None]
-        if sides[0] is not None or sides[1] is not None:
-            if not all(0.0 < number < np.inf for number in (*both, *view)):
-                words = " and ".join(f"{key} {quote_value(root.get(key))}" for key in _SIDES if root.get(key))
-                raise InputError(f"{words} and viewBox {quote_value(' '.join(box))} must be numbers above 0")
-            ratios = [side / wide for side, wide in zip(sides, view, strict=True) if side is not None]
-            stretched = root.get("preserveAspectRatio", "").strip() == "none" and len(ratios) == 2
-            scale = ratios if stretched else [min(ratios)] * 2
-        page = 1e-3 * scale[0] * view[0], 1e-3 * scale[1] * view[1]
-    elif sides[0] is not None and sides[1] is not None:
-        page = 1e-3 * sides[0], 1e-3 * sides[1]
-    return 1e-3 * np.array([[scale[0], 0.0, 0.0], [0.0, -scale[1], 0.0]]), page
 
 
 def _viewport(element: ET.Element) -> FloatArray:
@@ -486,35 +513,3 @@ def _path_data(element: ET.Element) -> str:
         around = (f"{side} a{rx!r},{ry!r} 0 0 1 {a!r},{b!r}" for side, (a, b) in zip(sides, turns, strict=True))
         return f"M{x + rx!r},{y!r} {' '.join(around)} Z"
     return ""
-
-
-def _flatten(text: str, scale: float) -> Iterator[tuple[FloatArray, bool]]:
-    """Yield the lines of path data, whose unit is so long [m], curves within `CHORD` of their chords."""
-    from fontTools.pens.recordingPen import RecordingPen  # type: ignore[import-untyped]
-    from fontTools.svgLib.path import parse_path  # type: ignore[import-untyped]
-
-    logging.getLogger("fontTools").addHandler(logging.NullHandler())
-    pen: Any = RecordingPen()
-    parse_path(text, pen)
-    points: list[FloatArray] = []
-    count = 0
-    for command, args in pen.value:
-        control = [np.array(point, dtype=np.float64) for point in args]
-        pieces = 1
-        if command in ("curveTo", "qCurveTo"):
-            curve = as_cubic(np.array([points[-1][-1], *control]))
-            bend = scale * float(np.linalg.norm(np.diff(curve, n=2, axis=0), axis=1).max())
-            pieces = int(np.clip(np.ceil(np.sqrt(0.75 * bend / CHORD)), 1, _MOST_CHORDS)) if bend < FARTHEST else 1
-        count += pieces
-        if count > MOST_POINTS:
-            raise InputError(TOO_MANY)
-        if command == "moveTo":
-            points = [control[0][None]]
-        elif command == "lineTo":
-            points.append(control[0][None])
-        elif command in ("curveTo", "qCurveTo"):
-            points.append(cubic_weights(np.linspace(0.0, 1.0, pieces + 1)[1:]) @ curve)
-        else:
-            line = np.concatenate(points)
-            ends_meet = bool(np.linalg.norm(line[0] - line[-1]) < 1e-6)
-            yield line, command == "closePath" or ends_meet

@@ -125,9 +125,29 @@ def split_pieces(surface: Surface, cut: Cut) -> tuple[CutPart, ...]:
         surface: the uncut surface.
         cut: made from its faces.
     """
-    whole = apply_cut(surface, cut)
+    whole, count = apply_cut(surface, cut), cut.component_count
+    if count == 1:
+        places = [""]
+    elif count > 2:
+        places = [f".{number}" for number in range(1, count + 1)]
+    elif cut.kind == "hole":
+        he = half_edges(cut.faces)
+        border = np.bincount(cut.face_component[he.face[he.count[he.edge] == 1]], minlength=2)
+        places = [".inner", ".outer"] if border[0] <= border[1] else [".outer", ".inner"]
+    else:
+        triangles, face, weight = corner_triangles(cut.faces)
+        area, middle = weight * flat_areas(whole.vertices, triangles), whole.vertices[triangles].mean(axis=1)
+        side = cut.face_component[face]
+        total = np.maximum(np.bincount(side, weights=area, minlength=2), np.finfo(float).tiny)
+        moment = [np.bincount(side, weights=area * middle[:, axis], minlength=2) for axis in range(3)]
+        apart = np.array([m[0] / total[0] - m[1] / total[1] for m in moment])
+        axis = int(np.argmax(np.abs(apart)))
+        # Facing +Z with Y up, the wearer's left hand is at +X.
+        places = [[".left", ".right"], [".upper", ".lower"], [".front", ".back"]][axis]
+        places = places if apart[axis] > 0 else places[::-1]
     pieces = []
-    for label, name in enumerate(_names_by_place(whole, cut)):
+    for label, place in enumerate(places):
+        name = f"{whole.name}{place}"
         face_index = np.flatnonzero(cut.face_component == label).astype(np.int32)
         faces = whole.faces[face_index]
         used = np.unique(faces[faces >= 0]).astype(np.int32)
@@ -150,27 +170,3 @@ def split_pieces(surface: Surface, cut: Cut) -> tuple[CutPart, ...]:
             CutPart(surface=part, vertex_index=used, vertex_origin=cut.vertex_origin[used], face_index=face_index)
         )
     return tuple(pieces)
-
-
-def _names_by_place(whole: Surface, cut: Cut) -> list[str]:
-    count = cut.component_count
-    if count == 1:
-        return [whole.name]
-    if count > 2:
-        return [f"{whole.name}.{number}" for number in range(1, count + 1)]
-    if cut.kind == "hole":
-        he = half_edges(cut.faces)
-        border = np.bincount(cut.face_component[he.face[he.count[he.edge] == 1]], minlength=2)
-        inner = int(np.argmin(border))
-        return [f"{whole.name}.{'inner' if label == inner else 'outer'}" for label in range(2)]
-    triangles, face, weight = corner_triangles(cut.faces)
-    area, middle = weight * flat_areas(whole.vertices, triangles), whole.vertices[triangles].mean(axis=1)
-    label = cut.face_component[face]
-    total = np.maximum(np.bincount(label, weights=area, minlength=2), np.finfo(float).tiny)
-    moment = [np.bincount(label, weights=area * middle[:, axis], minlength=2) for axis in range(3)]
-    apart = np.array([m[0] / total[0] - m[1] / total[1] for m in moment])
-    axis = int(np.argmax(np.abs(apart)))
-    # Facing +Z with Y up, the wearer's left hand is at +X.
-    more, less = (("left", "right"), ("upper", "lower"), ("front", "back"))[axis]
-    first, second = (more, less) if apart[axis] > 0 else (less, more)
-    return [f"{whole.name}.{first}", f"{whole.name}.{second}"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import replace
 from os import PathLike
 
@@ -14,7 +13,7 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import make_file_name, make_piece_name
 from warpflat.core.text import area_words, format_count
-from warpflat.flat.surface.io.raw_mesh import ALL_PRIMS, RawMesh
+from warpflat.flat.surface.io.raw_mesh import ALL_PRIMS
 from warpflat.flat.surface.io.read import POSSIBLE, check_size, read_mesh_file, wrong_size
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.normals import flat_areas
@@ -59,7 +58,14 @@ def read_pieces(
     found: list[Surface] = []
     closed, small = list[float](), list[float]()
     largest = 0.0
-    objects = list(_objects(raw, name or make_file_name(file.stem)))
+    stem, objects = name or make_file_name(file.stem), list[tuple[str, int, NDArray[np.int64]]]()
+    # Name, first vertex, and the faces in the object's own numbering.
+    named_at, object_of = raw.objects or ([(0, "")], np.zeros(len(raw.polygons), dtype=np.int64))
+    for number, (first, title) in enumerate(named_at):
+        polygons = raw.polygons[object_of == number]
+        if len(polygons):
+            own = np.where(polygons >= 0, polygons - first, -1)
+            objects.append((make_piece_name(title) if title else stem, first, own))
     notes = list(raw.notes)
     for title, first, polygons in objects:
         points = vertices[first : first + int(polygons.max()) + 1]
@@ -128,15 +134,6 @@ def object_parts(
     if notes is not None:
         notes += told
     return part, soup
-
-
-def _objects(raw: RawMesh, stem: str) -> Iterator[tuple[str, int, NDArray[np.int64]]]:
-    """Yield the objects of a file: name, first vertex, and the faces in its own numbering."""
-    objects, of = raw.objects or ([(0, "")], np.zeros(len(raw.polygons), dtype=np.int64))
-    for number, (first, name) in enumerate(objects):
-        polygons = raw.polygons[of == number]
-        if len(polygons):
-            yield make_piece_name(name) if name else stem, first, np.where(polygons >= 0, polygons - first, -1)
 
 
 def _named_apart(surfaces: list[Surface]) -> tuple[Surface, ...]:

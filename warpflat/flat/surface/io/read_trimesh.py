@@ -6,7 +6,6 @@ import io
 import json
 import logging
 import warnings
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -37,9 +36,27 @@ def read_with_trimesh(file: Path, *, node: str | None) -> RawMesh:
     Raises:
         InputError: without the file's name: it cannot be read, has no such node, or no faces.
     """
+    import trimesh
+
     suffix = file.suffix.lower()
     scene, materials, notes = _load_scene(file)
-    meshes = list(_instances(scene))
+    meshes = list[_Instance]()
+    for name in scene.graph.nodes_geometry:
+        transform, geometry = scene.graph[name]
+        mesh = scene.geometry[geometry]
+        if not isinstance(mesh, trimesh.Trimesh):
+            continue
+        vertices = np.asarray(mesh.vertices, dtype=np.float64)
+        matrix = np.asarray(transform, dtype=np.float64)
+        if not np.array_equal(matrix, np.eye(4)):
+            vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
+        faces = faces if np.linalg.det(matrix[:3, :3]) >= 0 else faces[:, ::-1]
+        texture = np.full((len(vertices), 2), np.nan)
+        given = np.asarray(mesh.vertex_attributes.get("_EXCOORD_0", texture))
+        if given.shape == texture.shape and given.dtype.kind in "fiu":
+            texture = given.astype(np.float64)
+        meshes.append(_Instance(name, geometry, vertices, faces, texture))
     if node is not None:
         names = [one.node for one in meshes]
         meshes = [one for one in meshes if one.node == node]
@@ -153,29 +170,6 @@ class _Instance(NamedTuple):
     vertices: FloatArray
     faces: NDArray[np.int64]
     texture: FloatArray
-
-
-def _instances(scene: Any) -> Iterator[_Instance]:
-    """Yield the meshes of a trimesh scene."""
-    import trimesh
-
-    for node in scene.graph.nodes_geometry:
-        transform, geometry = scene.graph[node]
-        mesh = scene.geometry[geometry]
-        if not isinstance(mesh, trimesh.Trimesh):
-            continue
-        vertices = np.asarray(mesh.vertices, dtype=np.float64)
-        matrix = np.asarray(transform, dtype=np.float64)
-        if not np.array_equal(matrix, np.eye(4)):
-            vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
-        faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
-        texture = np.full((len(vertices), 2), np.nan)
-        given = np.asarray(mesh.vertex_attributes.get("_EXCOORD_0", texture))
-        if given.shape == texture.shape and given.dtype.kind in "fiu":
-            texture = given.astype(np.float64)
-        yield _Instance(
-            node, geometry, vertices, faces if np.linalg.det(matrix[:3, :3]) >= 0 else faces[:, ::-1], texture
-        )
 
 
 def check_ply(path: Path) -> None:
