@@ -143,3 +143,10 @@ def test_a_wide_band_is_drawn_around_a_body_without_strain():
     assert np.abs(stretches(band, found)).max() < 0.05
     assert tube.gaps(found).min() > -2e-3
     assert np.hypot(found[:, 0], found[:, 2]).mean() == pytest.approx(0.11, abs=0.01)
+    # Where no body holds it, it goes with its opening to the limb that is said to go through that.
+    away = cylinder_body(radius=0.1, height=0.3, columns=40)
+    away.move(away.vertices + np.array([5.0, 0.0, 0.0]))
+    edge, limb = np.arange(columns - 1, dtype=np.int32), np.array([[0.05, -2.0, 0.0], [0.05, 2.0, 0.0]])
+    free, drawn = (sew_around(band, band.designed, ThinBody(away), rings=rings) for rings in ((), [(edge, limb)]))
+    assert abs(free[edge, 0].mean()) < 1e-3
+    assert 0.01 < drawn[edge, 0].mean() < 0.05
