@@ -53,6 +53,14 @@ def test_sleeves_go_around_the_arms_and_the_front_lies_in_front(swapped: bool):
     assert np.abs(stretches(cloth, laid.positions)).mean() < 0.05
     assert not laid.level.any()
     assert not laid.hooded
+    # A wider neck lies farther out on the shoulders, and lower.
+    neck = laid.positions[openings[-1].vertices, 1].mean()
+    wide = [({0.16: 0.1, 0.34: 0.4}.get(x, x), y) for x, y in TOP]
+    pieces, seams = top(*names)
+    _, openings, laid = lay(
+        [polygon(each.name, wide) if len(each.edges) == len(TOP) else each for each in pieces], seams
+    )
+    assert laid.positions[openings[-1].vertices, 1].mean() < neck - 0.01
 
 
 def test_a_cuff_goes_with_its_sleeve_and_a_hood_around_the_head():

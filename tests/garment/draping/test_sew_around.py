@@ -55,7 +55,7 @@ def test_limbs_run_on_and_a_thin_body_grows():
 def test_openings_are_linked_with_the_limbs_that_they_go_around():
     body = body_of_size(30.0)
     lines, skin = limb_lines(body), body.surface().vertices
-    assert (skin[on_arm(skin, lines)][:, 1] > lines["left arm"][2][1] - 0.1).all()
+    assert (skin[on_arm(skin, lines)][:, 1] > lines["left arm"][-2][1] - 0.1).all()
     angle = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
 
     def ring(middle: np.ndarray, radius: float, axis: np.ndarray) -> np.ndarray:
@@ -65,7 +65,7 @@ def test_openings_are_linked_with_the_limbs_that_they_go_around():
         return middle + radius * (np.outer(np.cos(angle), u) + np.outer(np.sin(angle), v / np.linalg.norm(v)))
 
     for limb in ("left arm", "right arm", "left leg", "right leg"):
-        _, near, end, _ = lines[limb]
+        near, end = lines[limb][-3:-1]
         # Not quite in the middle of the ring, where a line would meet the corner that all triangles of the fan share.
         found = links(ring(0.5 * (near + end) + [0.004, 0.003, 0.002], 0.05, end - near), lines)
         assert {each: abs(count) for each, count in found.items()} == {each: int(each == limb) for each in found}
@@ -143,3 +143,10 @@ def test_a_wide_band_is_drawn_around_a_body_without_strain():
     assert np.abs(stretches(band, found)).max() < 0.05
     assert tube.gaps(found).min() > -2e-3
     assert np.hypot(found[:, 0], found[:, 2]).mean() == pytest.approx(0.11, abs=0.01)
+    # Where no body holds it, it goes with its opening to the limb that is said to go through that.
+    away = cylinder_body(radius=0.1, height=0.3, columns=40)
+    away.move(away.vertices + np.array([5.0, 0.0, 0.0]))
+    edge, limb = np.arange(columns - 1, dtype=np.int32), np.array([[0.05, -2.0, 0.0], [0.05, 2.0, 0.0]])
+    free, drawn = (sew_around(band, band.designed, ThinBody(away), rings=rings) for rings in ((), [(edge, limb)]))
+    assert abs(free[edge, 0].mean()) < 1e-3
+    assert 0.01 < drawn[edge, 0].mean() < 0.05

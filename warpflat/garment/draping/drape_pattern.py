@@ -314,7 +314,8 @@ def _sew(
     for rows in cloth.piece_vertices.values():
         below[cloth.welded[rows]] |= start[cloth.welded[rows], 1].max() < armpit
     thin = ThinBody(solid, on_arm(solid.vertices, lines), below)
-    sewn = sew_around(cloth, start, thin, level=laid.level)
+    rings = [(each.vertices, lines[limb]) for each, limb in zip(openings, limbs, strict=True) if limb]
+    sewn = sew_around(cloth, start, thin, level=laid.level, rings=rings)
     check_sewn(cloth, sewn, openings, limbs, lines, buttoned=bool(buttons))
     lifts = {
         name: surface_lift(sewn[cloth.welded[cloth.piece_vertices[name]]], mesh.points, mesh.triangles)

@@ -125,8 +125,19 @@ def lay_around(
         far = np.array([dijkstra(graph, directed=False, indices=each.vertices, min_only=True) for each in parted])
         far[~np.isfinite(far)] = 0.0  # of other garments
         kinds = _kinds(parted, far, up, polyline_length(body.line("waist"), closed=True))
-        highest = parted[kinds.index("neck" if "neck" in kinds else "waist")].vertices
-        high = float(body.line("collar")[:, 1].mean()) if "neck" in kinds else top(float(up[highest].mean()))
+        edge = parted[kinds.index("neck" if "neck" in kinds else "waist")]
+        highest, arms = edge.vertices, [k for k, kind in enumerate(kinds) if kind == "arm"]
+        # The edge of a hood rises over the shoulders, from the throat to the crown.
+        hood = bool(arms) and float(np.ptp(far[arms].mean(axis=0)[highest])) > _HOOD
+        collar, shoulder = body.line("collar"), body.line("shoulder left")
+        if "neck" not in kinds:
+            high = top(float(up[highest].mean()))
+        elif hood:
+            high = float(collar[:, 1].mean())
+        else:
+            # The wider a neck, the farther out and the lower on the shoulders it lies.
+            radius = np.maximum.accumulate([polyline_length(collar, closed=True) / (2.0 * np.pi), *shoulder[:, 0]])
+            high = float(np.interp(edge.length / (2.0 * np.pi), radius, [collar[:, 1].mean(), *shoulder[:, 1]]))
         from_low = far[[k for k, kind in enumerate(kinds) if kind in ("hem", "leg")]].min(axis=0)
         # Without another sign the highest edge is deeper in front, nearer to the lowest ones.
         looks = hints * (part == own)[:, None]
@@ -134,11 +145,11 @@ def lay_around(
             looks[highest, 2] = -from_low[highest]
         trials = []
         for swapped in (False, True):
-            named, hood = _name_limbs(kinds, parted, far, swapped=swapped)
+            named = _name_limbs(kinds, parted, far, swapped=swapped)
             found = _rings(graph, parted, far, named, hood, body, lines, hints=hints, high=high, handed=handed)
             places = _harmonic(rigid, found, part == own)
-            trials.append((float((looks * places).sum()), places, found, named, hood))
-        _, places, found, named, hood = max(trials, key=lambda trial: trial[0])
+            trials.append((float((looks * places).sum()), places, found, named))
+        _, places, found, named = max(trials, key=lambda trial: trial[0])
         laid[part == own] = places[part == own]
         level |= (part == own) & ("neck" not in kinds)
         rings += found
@@ -160,7 +171,7 @@ def lay_around(
             for ring in rings:
                 target[ring.vertices] = ring.nearest_places(laid[ring.vertices])
             for arm, below_arm in under.items():
-                _, armhole, wrist, _ = lines[arm]
+                armhole, wrist = lines[arm][-3:-1]
                 along = np.interp(np.abs(laid[below_arm, 0]), np.abs([armhole[0], wrist[0]]), [armhole[1], wrist[1]])
                 target[below_arm, 1] = np.minimum(target[below_arm, 1], along - (armhole[1] - armpits[arm]))
             laid = rigid.step(laid, target)
@@ -225,10 +236,8 @@ def _kinds(openings: Sequence[Opening], far: FloatArray, up: FloatArray, waist: 
     return [named.get(k, "") for k in range(len(openings))]
 
 
-def _name_limbs(
-    kinds: Sequence[str], openings: Sequence[Opening], far: FloatArray, *, swapped: bool
-) -> tuple[list[str], bool]:
-    """Return the kinds of openings with their sides, and whether that of the neck is a hood's."""
+def _name_limbs(kinds: Sequence[str], openings: Sequence[Opening], far: FloatArray, *, swapped: bool) -> list[str]:
+    """Return the kinds of openings with their sides."""
     arms, legs = ([k for k, kind in enumerate(kinds) if kind == limb] for limb in ("arm", "leg"))
     if (
         arms
@@ -236,12 +245,8 @@ def _name_limbs(
         and far[arms[0]][openings[legs[0]].vertices].min() > far[arms[0]][openings[legs[1]].vertices].min()
     ):
         legs.reverse()
-    # The edge of a hood rises over the shoulders, from the throat to the crown.
-    rise = np.ptp(far[arms].mean(axis=0)[openings[kinds.index("neck")].vertices]) if arms else 0.0
     left = {pair[1 if swapped else 0] for pair in (arms, legs) if pair}
-    return [
-        f"{'left' if k in left else 'right'} {kind}" if k in arms + legs else kind for k, kind in enumerate(kinds)
-    ], bool(rise > _HOOD)
+    return [f"{'left' if k in left else 'right'} {kind}" if k in arms + legs else kind for k, kind in enumerate(kinds)]
 
 
 def _rings(
@@ -271,9 +276,11 @@ def _rings(
         radius = each.length / (2.0 * np.pi)
         value, looks = (aside, left) if aside is not None else (hints[:, 2], ahead)
         if name == "neck":
-            centre, out = (collar, UP) if not hooded else (lines["head"][2] - _LOWER * UP + _BEFORE_FACE * ahead, ahead)
+            centre, out = collar * [1.0, 0.0, 1.0] + high * UP, UP
+            if hooded:
+                centre, out = lines["head"][2] - _LOWER * UP + _BEFORE_FACE * ahead, ahead
         elif name.endswith("arm"):
-            line = np.array([collar, *lines[name][1:]])
+            line = lines[name][1:]
             # From the edge of the neck along the shoulder.
             reach += openings[highest].length / (2.0 * np.pi) if not hooded else 0.0
             beyond = max(0.0, reach - float(np.linalg.norm(line[1] - line[0])))

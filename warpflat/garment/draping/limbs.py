@@ -19,15 +19,16 @@ _BEYOND, _FACE, _ARM = 3.0, 0.15, 0.09
 def limb_lines(body: Mannequin) -> dict[str, FloatArray]:
     """Return by "head", "left arm", "right arm", "left leg" and "right leg" the points from the chest out and beyond (#P by 3 [m]).
 
-    That of the head leaves through the face, as it does in a hood.
+    That of the head leaves through the face, as it does in a hood. Those of the arms go by its base, inside the shoulders.
     """
-    chest, neck = body.line("bust").mean(axis=0), body.line("collar").mean(axis=0)
+    chest, base, neck = (body.line(line).mean(axis=0) for line in ("bust", "neck", "collar"))
     face = neck + np.array([0.0, _FACE, 0.0])
     found = {"head": np.array([chest, neck, face, face + np.array([0.0, 0.0, _BEYOND])])}
     for limb, ends in {"arm": ("armhole", "wrist"), "leg": ("thigh", "ankle")}.items():
         for side in ("left", "right"):
             near, end = (body.line(f"{line} {side}").mean(axis=0) for line in ends)
-            found[f"{side} {limb}"] = np.array([chest, near, end, end + _BEYOND * unit(end - near)])
+            by = [chest, base] if limb == "arm" else [chest]
+            found[f"{side} {limb}"] = np.array([*by, near, end, end + _BEYOND * unit(end - near)])
     return found
 
 
@@ -74,7 +75,7 @@ def on_arm(points: FloatArray, lines: Mapping[str, FloatArray]) -> BoolArray:
     """Return #P, which points of a body (#P by 3 [m]) lie on an arm, beyond its armhole."""
     found = np.zeros(len(points), dtype=bool)
     for limb in ("left arm", "right arm"):
-        _, armhole, wrist, _ = lines[limb]
+        armhole, wrist = lines[limb][-3:-1]
         way = unit(wrist - armhole)
         along = (points - armhole) @ way
         found |= (along > 0.0) & (np.linalg.norm(points - armhole - along[:, None] * way, axis=1) < _ARM)

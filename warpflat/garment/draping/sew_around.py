@@ -7,10 +7,12 @@ body grows, then the cloth settles on it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.sparse import coo_array, diags_array
 
-from warpflat.core import BoolArray, FloatArray, factor_symmetric
+from warpflat.core import BoolArray, FloatArray, IntArray, factor_symmetric, nearest_on_polyline
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.sewn_cloth import SewnCloth
 from warpflat.garment.draping.thin_body import ThinBody
@@ -22,8 +24,8 @@ __all__ = ["AsRigid", "sew_around", "stretches"]
 _GATHER, _GROW, _SETTLE, _RENEWED, _NEW_CONTACT = 60, 60, 30, 2, 0.02
 # The cloth is kept so far off the body [m]; planes farther than this do not count.
 _OFF, _REACH = 0.002, 0.12
-# Stiffness over the cloth's: of inertia, of contact, of what stays, and of bending.
-_INERTIA, _HOLD, _STAY, _BEND = 0.02, 1.0, 1e3, 0.02
+# Stiffness over the cloth's: of inertia, of openings that stay around their limbs, of contact, of what stays, and of bending.
+_INERTIA, _RING, _HOLD, _STAY, _BEND = 0.02, 0.1, 1.0, 1e3, 0.02
 # What hangs from no shoulder goes back to its height by this share until the body has grown. What hangs free falls by so much [m] a round.
 _KEEP, _FALL = 0.1, 0.003
 
@@ -35,6 +37,7 @@ def sew_around(
     *,
     fixed: BoolArray | None = None,
     level: BoolArray | None = None,
+    rings: Sequence[tuple[IntArray, FloatArray]] = (),
 ) -> FloatArray:
     """Draw sewn cloth together around a body, nearly without strain.
 
@@ -44,6 +47,8 @@ def sew_around(
         body: what it stays outside of; a thin one grows.
         fixed: #V, the vertices that stay there.
         level: #V, those that keep their height until the body has grown.
+        rings: openings (#R, their vertices) and the limb that goes through each (#P by 3 [m]); its middle is drawn to the limb until the
+            body has grown.
 
     Returns:
         #V by 3 [m].
@@ -60,13 +65,21 @@ def sew_around(
         near = (depth < _OFF) & (np.linalg.norm(x - centre, axis=1) < _REACH)
         if number % _RENEWED == 0 or (near & ~touching).sum() > _NEW_CONTACT * len(x):
             touching = near
-            rigid.hold(_INERTIA + _HOLD * touching + _STAY * stays)
+            around = np.zeros(len(x))
+            if number < gather + grow:
+                for ring, _ in rings:
+                    around[ring] = _RING
+            rigid.hold(_INERTIA + np.maximum(_HOLD * touching, around) + _STAY * stays)
         target = np.where((near & touching)[:, None], x + (_OFF - depth)[:, None] * normal, x)
         if grow:
             grown = number >= gather + grow
             target[:, 1] += (
                 _KEEP * (start[:, 1] - x[:, 1]) * (kept & (not grown)) - _FALL * (number >= gather // 2) * ~near
             )
+            if not grown:
+                for ring, limb in rings:
+                    middle = x[ring].mean(axis=0)
+                    target[ring] += nearest_on_polyline(middle, limb) - middle
         target[stays] = start[stays]
         x = rigid.step(x, target)
     return x
