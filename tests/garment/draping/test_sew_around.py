@@ -16,7 +16,7 @@ from warpflat.core.errors import InputError
 from warpflat.flat.surface.connectivity import border_loops
 from warpflat.garment.draping.check_sewn import check_sewn, pierced_edges
 from warpflat.garment.draping.drape_pattern import Placement, drape_pattern
-from warpflat.garment.draping.limbs import limb_lines, links, on_arm
+from warpflat.garment.draping.limbs import DRAWN_OUT, hangs_beyond, limb_lines, links, on_arm
 from warpflat.garment.draping.mesh_pieces import mesh_pieces, sew_meshes
 from warpflat.garment.draping.openings import find_openings
 from warpflat.garment.draping.options import DrapeOptions
@@ -70,6 +70,11 @@ def test_openings_are_linked_with_the_limbs_that_they_go_around():
         found = links(ring(0.5 * (near + end) + [0.004, 0.003, 0.002], 0.05, end - near), lines)
         assert {each: abs(count) for each, count in found.items()} == {each: int(each == limb) for each in found}
         assert not any(links(ring(0.5 * (near + end) + [0.0, 0.0, 0.2], 0.05, end - near), lines).values())
+        # Beyond its end nothing is there to go around.
+        way = (end - near) / np.linalg.norm(end - near)
+        for beyond in (0.1, 0.4):
+            aside = ring(end + beyond * way + [0.0, 0.0, 0.2], 0.05, way)
+            assert hangs_beyond(aside, limb, lines) == (beyond > max(DRAWN_OUT.values()))
     up = np.array([0.0, 1.0, 0.0])
     hem, neck = (links(ring(middle, 0.4, up), lines) for middle in (lines["left leg"][1] * [0, 1, 1], lines["head"][1]))
     assert hem["left leg"] == hem["right leg"] != 0

@@ -10,7 +10,7 @@ import warp as wp
 from warpflat.core import BoolArray, FloatArray, IntArray, StepError, launch_each
 from warpflat.flat import mesh_edges
 from warpflat.garment.draping.body import Body
-from warpflat.garment.draping.limbs import crossings, links
+from warpflat.garment.draping.limbs import crossings, hangs_beyond, links
 from warpflat.garment.draping.openings import Opening
 from warpflat.garment.draping.sew_around import stretches
 from warpflat.garment.draping.sewn_cloth import SewnCloth
@@ -71,7 +71,8 @@ def check_sewn(
     for opening, limb, found in zip(openings, limbs, around, strict=True):
         # A hole in the cloth, as of a pocket, goes around nothing.
         wrong = (
-            abs(found[limb]) != 1 or sum(map(bool, found.values())) > 1
+            (abs(found[limb]) != 1 or sum(map(bool, found.values())) > 1)
+            and not hangs_beyond(positions[opening.vertices], limb, lines)
             if limb
             else not (any(found.values()) or buttoned)
         )

@@ -10,8 +10,10 @@ import numpy as np
 from warpflat.core import BoolArray, FloatArray, unit
 from warpflat.garment.mannequin.mannequin import Mannequin
 
-__all__ = ["armpit_heights", "crossings", "limb_lines", "links", "on_arm"]
+__all__ = ["DRAWN_OUT", "armpit_heights", "crossings", "hangs_beyond", "limb_lines", "links", "on_arm"]
 
+#: How far arms and legs are drawn out beyond wrist and ankle [m], so that hems there have something to go around.
+DRAWN_OUT = {"arm": 0.18, "leg": 0.30}
 # A limb goes on by so much [m] beyond its end, the face is so far above the neck, and an arm is nowhere thicker than this [m].
 _BEYOND, _FACE, _ARM = 3.0, 0.15, 0.09
 
@@ -69,6 +71,12 @@ def links(loop: FloatArray, lines: Mapping[str, FloatArray]) -> dict[str, int]:
     fan = np.stack([np.broadcast_to(loop.mean(axis=0), loop.shape), loop, np.roll(loop, -1, axis=0)], axis=1)
     through = {limb: round(float(crossings(line, fan).sum())) for limb, line in lines.items()}
     return {limb: count - through["head"] for limb, count in through.items() if limb != "head"}
+
+
+def hangs_beyond(points: FloatArray, limb: str, lines: Mapping[str, FloatArray]) -> bool:
+    """Return whether points (#P by 3 [m]) all lie beyond the end of a limb, as the hems of long sleeves and trousers on a child do."""
+    end, far = lines[limb][-2:]
+    return bool(((points - end) @ unit(far - end)).min() > DRAWN_OUT[limb.split(" ")[1]])
 
 
 def on_arm(points: FloatArray, lines: Mapping[str, FloatArray]) -> BoolArray:

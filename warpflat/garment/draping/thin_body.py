@@ -13,12 +13,13 @@ from scipy.spatial import cKDTree
 from warpflat.core import BoolArray, FloatArray, IntArray, unit
 from warpflat.flat import border_loops, mesh_edges, vertex_normals
 from warpflat.garment.draping.body import Body
+from warpflat.garment.draping.limbs import DRAWN_OUT
 from warpflat.garment.mannequin.sampled import neighbour_mean
 
 __all__ = ["ThinBody", "draw_out_limbs"]
 
-# How far legs and arms are drawn out, in steps of so much [m]; an arm gets narrower by this share in a step.
-_LEG, _ARM, _STEP, _NARROWS = 0.30, 0.18, 0.02, 0.03
+# Limbs are drawn out in steps of so much [m]; an arm gets narrower by this share in a step.
+_STEP, _NARROWS = 0.02, 0.03
 # Beside its end a limb is looked at from so far to so far [m]. Legs end below this share of the body's height.
 _BESIDE, _LOW = (0.05, 0.10), 0.3
 # The thin body has lost this share of its inscribed balls. No ball is larger than this [m].
@@ -41,7 +42,7 @@ def draw_out_limbs(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, I
         far = np.linalg.norm(vertices - middle, axis=1)
         way = middle - vertices[(far > _BESIDE[0]) & (far < _BESIDE[1])].mean(axis=0)
         is_leg = middle[1] < vertices[:, 1].min() + _LOW * np.ptp(vertices[:, 1])
-        length, narrows = (_LEG, 0.0) if is_leg else (_ARM, _NARROWS)
+        length, narrows = (DRAWN_OUT["leg"], 0.0) if is_leg else (DRAWN_OUT["arm"], _NARROWS)
         way = np.array([0.0, -1.0, 0.0]) if is_leg else unit(way)
         steps = np.arange(1, round(length / _STEP) + 1)[:, None, None]
         rings = middle + (1.0 - narrows * steps) * (vertices[loop] - middle) + _STEP * steps * way
