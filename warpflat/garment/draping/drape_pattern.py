@@ -10,7 +10,17 @@ import numpy as np
 import shapely
 import warp as wp
 
-from warpflat.core import AXES, FloatArray, InputError, nearest, polyline_length, reflected, short_repr, start_warp
+from warpflat.core import (
+    AXES,
+    FloatArray,
+    InputError,
+    StepError,
+    nearest,
+    polyline_length,
+    reflected,
+    short_repr,
+    start_warp,
+)
 from warpflat.flat import Fabric, Surface, triangulate, vertex_normals
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.mirror import mirror_plane
@@ -304,19 +314,27 @@ def _sew(
         raise InputError(
             f"the pattern goes {1e3 * around:.0f} mm around the body, whose waist has {1e3 * girth:.0f} mm: {_UNITS} Is a piece missing?"
         )
-    laid = lay_pieces(cloth, meshed, openings, body, top=placement.top)
-    start, limbs = laid.positions, laid.limbs
-    is_hooded = laid.hooded or any(piece.role == "hood" for piece in pieces.values())
-    solid = _worn_body(body, head=is_hooded, device=device)
-    # What begins below the arms passes through.
-    armpit = min(armpit_heights(body).values())
-    below = np.zeros(len(start), dtype=bool)
-    for rows in cloth.piece_vertices.values():
-        below[cloth.welded[rows]] |= start[cloth.welded[rows], 1].max() < armpit
-    thin = ThinBody(solid, on_arm(solid.vertices, lines), below)
-    rings = [(each.vertices, lines[limb]) for each, limb in zip(openings, limbs, strict=True) if limb]
-    sewn = sew_around(cloth, start, thin, level=laid.level, rings=rings)
-    check_sewn(cloth, sewn, openings, limbs, lines, buttoned=bool(buttons))
+    armpit, refused = min(armpit_heights(body).values()), list[StepError]()
+    while True:
+        # What is sewn wrong as it hangs from the shoulders may come right as it hangs from the collar: tops far too wide for a body do.
+        laid = lay_pieces(cloth, meshed, openings, body, top=placement.top, on_shoulders=not refused)
+        start, limbs = laid.positions, laid.limbs
+        is_hooded = laid.hooded or any(piece.role == "hood" for piece in pieces.values())
+        solid = _worn_body(body, head=is_hooded, device=device)
+        # What begins below the arms passes through.
+        below = np.zeros(len(start), dtype=bool)
+        for rows in cloth.piece_vertices.values():
+            below[cloth.welded[rows]] |= start[cloth.welded[rows], 1].max() < armpit
+        thin = ThinBody(solid, on_arm(solid.vertices, lines), below)
+        arms = [(each.vertices, lines[limb]) for each, limb in zip(openings, limbs, strict=True) if limb[-3:] == "arm"]
+        sewn = sew_around(cloth, start, thin, level=laid.level, rings=arms)
+        try:
+            check_sewn(cloth, sewn, openings, limbs, lines, buttoned=bool(buttons))
+            break
+        except StepError as error:
+            if refused or laid.hooded or laid.level.all():
+                raise (refused or [error])[0] from None
+            refused.append(error)
     lifts = {
         name: surface_lift(sewn[cloth.welded[cloth.piece_vertices[name]]], mesh.points, mesh.triangles)
         for name, mesh in meshed.meshes.items()
@@ -387,6 +405,7 @@ def lay_pieces(
     body: Mannequin,
     *,
     top: str | float | None = None,
+    on_shoulders: bool = True,
 ) -> Laid:
     """Return how sewn pieces are laid around a body: see `lay_around`.
 
@@ -429,4 +448,6 @@ def lay_pieces(
             return high + float(np.mean(off))
         return high if is_hung and heights["hip"] < high < shoulder else heights["waist"]
 
-    return lay_around(cloth, openings, body, limb_lines(body), up=up, hints=hints, top=hangs_at)
+    return lay_around(
+        cloth, openings, body, limb_lines(body), up=up, hints=hints, top=hangs_at, on_shoulders=on_shoulders
+    )

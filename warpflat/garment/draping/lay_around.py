@@ -93,6 +93,7 @@ def lay_around(
     up: FloatArray,
     hints: FloatArray,
     top: Callable[[float], float],
+    on_shoulders: bool = True,
 ) -> Laid:
     """Lay sewn cloth around a body.
 
@@ -104,6 +105,7 @@ def lay_around(
         up: #V, how high each vertex lies in its piece [m].
         hints: #V by 3, where each vertex is said to lie: x is 1 to the left and z in front, -1 to the right and behind, 0 if unknown.
         top: the height [m] at which what does not hang from the shoulders hangs, by that of its highest opening in `up`.
+        on_shoulders: whether a neck lies on the shoulders, else at the collar.
 
     Raises:
         InputError: the openings are not those of a garment.
@@ -132,7 +134,7 @@ def lay_around(
         collar, shoulder = body.line("collar"), body.line("shoulder left")
         if "neck" not in kinds:
             high = top(float(up[highest].mean()))
-        elif hood:
+        elif hood or not on_shoulders:
             high = float(collar[:, 1].mean())
         else:
             # The wider a neck, the farther out and the lower on the shoulders it lies.
