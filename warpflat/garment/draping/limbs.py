@@ -21,7 +21,7 @@ _BEYOND, _FACE, _ARM = 3.0, 0.15, 0.09
 def limb_lines(body: Mannequin) -> dict[str, FloatArray]:
     """Return by "head", "left arm", "right arm", "left leg" and "right leg" the points from the chest out and beyond (#P by 3 [m]).
 
-    That of the head leaves through the face, as it does in a hood. Those of the arms go by its base, inside the shoulders.
+    That of the head leaves through the face, as it does in a hood. Those of the arms go by the neck's base, inside the shoulders.
     """
     chest, base, neck = (body.line(line).mean(axis=0) for line in ("bust", "neck", "collar"))
     face = neck + np.array([0.0, _FACE, 0.0])
