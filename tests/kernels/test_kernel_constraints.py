@@ -66,7 +66,7 @@ def launch(positions: NDArray[np.float64], velocities: NDArray[np.float64], time
         np.add.at(total, ENDS.ravel(), slots)
         return total
 
-    return gathered(force.numpy()), gathered(viscosity.numpy()), gathered(stiffness.numpy())
+    return gathered(force.numpy()), gathered(viscosity.numpy()), stiffness.numpy().reshape(-1, 4)
 
 
 def test_forces_are_minus_the_gradient_of_the_energy():
@@ -106,8 +106,14 @@ def test_the_stiffness_bounds_the_curvature_when_all_ends_move():
         moved[0][k] += 1e-7
         moved[1][k] -= 1e-7
         rows[:, k] = (misses(moved[0].reshape(-1, 2)) - misses(moved[1].reshape(-1, 2))) / 2e-7
-    scaled = rows / np.sqrt(np.repeat(stiffness, 2))
+    at_vertex = np.bincount(ENDS.ravel(), stiffness.ravel())
+    scaled = rows / np.sqrt(np.repeat(at_vertex, 2))
     assert np.linalg.eigvalsh(scaled.T @ np.diag(STIFFNESS) @ scaled).max() < 2.0
+    # An end that takes no part, or is a vertex that does already, has no gradient.
+    size = np.linalg.norm(rows.reshape(COUNT, -1, 2), axis=2)
+    for p in range(COUNT):
+        found = np.bincount(ENDS[p], stiffness[p], minlength=len(POSITIONS))
+        np.testing.assert_allclose(found, 0.75 * STIFFNESS[p] * size[p] * size[p].sum(), rtol=1e-6)
 
 
 def test_misses_and_edges_of_no_length():

@@ -19,7 +19,7 @@ from warpflat.kernels.drape import (
 )
 from warpflat.kernels.drape_contact import anchor_friction, carry_contact
 from warpflat.kernels.drape_steps import advance_drape, watch_power
-from warpflat.kernels.drape_stiffness import stiffen_cloth
+from warpflat.kernels.drape_stiffness import stiffen_cloth, stiffen_contact
 
 from warpflat.core.launch import launch_each
 from warpflat.flat.fabric.fabric import Fabric
@@ -224,34 +224,53 @@ def test_what_presses_as_deep_as_before_gets_a_stiffer_skin():
     np.testing.assert_allclose(motion.position.numpy()[:, 1], [0.0, 0.0, 0.5, -1.0, 0.0, 0.0])
 
 
-def test_forces_of_body_and_friction_are_the_gradient_of_their_energy():
-    """Vertices that are rubbed by less and by more than Coulomb's bound, that press with what they carry alone, and that lie off."""
-    places = np.array([[0.0, -1e-3, 0.0], [2.0, -2e-3, 1.0], [3.0, 1e-3, 0.0], [4.0, 0.1, 0.0]])
-    contact, count = Contact(), len(places)
-    contact.centre, contact.normal = on(np.zeros((count, 3)), wp.vec3d), on([[0.0, 1.0, 0.0]] * count, wp.vec3d)
+# Vertices that are rubbed by less and by more than Coulomb's bound, that press with what they carry alone, that lie off, and on a ball.
+TOUCHING = np.array([[0.0, -1e-3, 0.0], [2.0, -2e-3, 1.0], [3.0, 1e-3, 0.0], [4.0, 0.1, 0.0], [5.0, 0.0, 0.0]])
+
+
+def touching() -> Contact:
+    """Contact of TOUCHING with the plane y = 0, and with a ball of 0.2 m on it."""
+    contact, count = Contact(), len(TOUCHING)
+    contact.centre, contact.normal = on(TOUCHING * [1.0, 0.0, 1.0], wp.vec3d), on([[0.0, 1.0, 0.0]] * count, wp.vec3d)
     contact.skin, contact.grip = on([100.0] * count, wp.float64), on([50.0] * count, wp.float64)
-    contact.ball = on(np.zeros(count), wp.float64)
-    contact.pressed, contact.most = on([0.0, 0.5, 0.5, 0.5], wp.float64), on([1.0, 1.0, 1.0, 0.0], wp.float64)
-    off = np.array([[0.01, 0.3, 0.0], [0.6, 0.0, 0.8], [0.0, 0.0, 0.01], [0.1, 0.0, 0.0]])
-    contact.anchor = on(places + off, wp.vec3d)
+    contact.ball = on([0.0, 0.0, 0.0, 0.0, 0.2], wp.float64)
+    contact.pressed, contact.most = on([0.0, 0.5, 0.5, 0.5, 0.5], wp.float64), on([1.0, 1.0, 1.0, 0.0, 0.0], wp.float64)
+    off = np.array([[0.01, 0.3, 0.0], [0.6, 0.0, 0.8], [0.0, 0.0, 0.01], [0.1, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    contact.anchor = on(TOUCHING + off, wp.vec3d)
+    return contact
+
+
+def touched(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Forces of body and friction at places (#V by 3), and their energy."""
+    count = len(at)
     none = [on(np.zeros(count + 1), wp.int32), on([], wp.int32), wp.empty(0, wp.vec3d, DEVICE)]
     none += [make_bending(np.zeros((count, count)), np.zeros(count)), on(np.zeros((count, 3)), wp.vec3d)]
+    motion = Motion()
+    motion.position, motion.weight = on(at, wp.vec3d), on(np.zeros(count), wp.float64)
+    motion.fixed = on(np.zeros(count), wp.int8)
+    force, energy = wp.zeros(count, wp.vec3d, DEVICE), wp.zeros(count, wp.float64, DEVICE)
+    launch_each(gather_drape, count, [motion, 0.0, touching(), *none], [force, energy], device=DEVICE)
+    return force.numpy(), energy.numpy()
 
-    def gathered(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        motion = Motion()
-        motion.position, motion.weight = on(at, wp.vec3d), on(np.zeros(count), wp.float64)
-        motion.fixed = on(np.zeros(count), wp.int8)
-        force, energy = wp.zeros(count, wp.vec3d, DEVICE), wp.zeros(count, wp.float64, DEVICE)
-        launch_each(gather_drape, count, [motion, 0.0, contact, *none], [force, energy], device=DEVICE)
-        return force.numpy(), energy.numpy()
 
-    force, _ = gathered(places)
-    asked = [[0.5, 0.1, 0.0], [0.6, 0.7, 0.8], [0.0, 0.4, 0.5], [0.0, 0.0, 0.0]]
+def test_forces_of_body_and_friction_are_the_gradient_of_their_energy():
+    force, _ = touched(TOUCHING)
+    asked = [[0.5, 0.1, 0.0], [0.6, 0.7, 0.8], [0.0, 0.4, 0.5], [0.0, 0.0, 0.0], [0.0, 0.5, 0.0]]
     np.testing.assert_allclose(force, asked, atol=1e-12)
     for axis in np.eye(3):
         step = 1e-6 * axis
-        slope = (gathered(places + step)[1] - gathered(places - step)[1]) / 2e-6
+        slope = (touched(TOUCHING + step)[1] - touched(TOUCHING - step)[1]) / 2e-6
         np.testing.assert_allclose(force @ axis, -slope, atol=1e-8)
+
+
+def test_stiffness_of_contact_is_minus_the_gradient_of_its_forces():
+    motion, count = Motion(), len(TOUCHING)
+    motion.position, motion.fixed = on(TOUCHING, wp.vec3d), on(np.zeros(count), wp.int8)
+    stiffness = wp.zeros(count, wp.mat33d, DEVICE)
+    launch_each(stiffen_contact, count, [motion, touching(), 7.0], [stiffness], device=DEVICE)
+    for k, axis in enumerate(np.eye(3)):
+        slope = (touched(TOUCHING + 1e-6 * axis)[0] - touched(TOUCHING - 1e-6 * axis)[0]) / 2e-6
+        np.testing.assert_allclose(stiffness.numpy()[:, :, k], 7.0 * axis - slope, atol=1e-6)
 
 
 @pytest.mark.parametrize(("sums", "halts"), [([1.0, -0.5], 0), ([1.0, -1.5], 1), ([0.0, 0.0], 0)])
