@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import warp as wp
 from numpy.typing import NDArray
 from small_networks import CLOTH, DEVICE, Launched, corner_vertices, shaken, small_network
+from warpflat.kernels.guard import is_beyond_anywhere
 
 from warpflat.flat.fabric.fabric import grain_axes
 from warpflat.flat.model.network import SpringNetwork
@@ -377,3 +379,26 @@ def test_energy_and_forces_at_once_are_those_of_a_step_and_of_the_energy_alone()
     np.testing.assert_allclose(alone["force"], at["force"], rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(alone["face_energy"], at.guard_energy(), rtol=1e-12, atol=1e-18)
     np.testing.assert_allclose(alone["energy"], at.spring_energy(), rtol=1e-12, atol=1e-18)
+
+
+@wp.kernel
+def _ask_beyond(
+    a: wp.array(dtype=wp.vec2d),
+    b: wp.array(dtype=wp.vec2d),
+    unit: wp.float64,
+    stretch: wp.float64,
+    answer: wp.array(dtype=bool),
+):
+    i = wp.tid()
+    answer[i] = is_beyond_anywhere(a[i], b[i], unit, stretch)
+
+
+@pytest.mark.parametrize("unit", [0.4, 2.5])
+def test_a_sheet_is_beyond_where_its_largest_singular_value_is(unit: float):
+    deformations = unit * np.random.default_rng(3).normal(0.0, 0.7, (200, 2, 2))
+    longest = np.linalg.svd(deformations, compute_uv=False)[:, 0]
+    a, b = (wp.array(deformations[:, :, k], dtype=wp.vec2d, device=DEVICE) for k in range(2))
+    answer = wp.zeros(200, dtype=bool, device=DEVICE)
+    wp.launch(_ask_beyond, dim=200, inputs=[a, b, unit, 0.1], outputs=[answer], device=DEVICE)
+    np.testing.assert_array_equal(answer.numpy(), longest > 1.1 * unit)
+    assert 20 < answer.numpy().sum() < 180
