@@ -16,11 +16,14 @@ FALLS = wp.constant(wp.float64(0.25))
 STIFFEST = wp.constant(wp.float64(0.015))
 # The normals of a groove's two sides have a cosine below this one.
 TURNED = wp.constant(wp.float32(0.5))
-# What lies nearer to a ball's middle than this share of its radius pushes it off, in so many turns at most; in a sharper groove its middle
-# would be farther off than so many radii.
-HITS = wp.constant(wp.float32(0.9))
-TURNS = wp.constant(12)
+# What lies nearer to a ball's middle than this share of its radius is one more side of the groove, of so many at most; in a sharper groove
+# its middle would be farther off than so many radii. The middle goes so often from side to side.
+HITS = wp.constant(wp.float32(0.99))
+SIDES = wp.constant(8)
 SHARPEST = wp.constant(wp.float32(2.0))
+SWEEPS = wp.constant(16)
+mat83 = wp.types.matrix(shape=(8, 3), dtype=wp.float32)
+vec8 = wp.types.vector(length=8, dtype=wp.float32)
 
 
 @wp.func
@@ -32,6 +35,39 @@ def normal_at(mesh: wp.uint64, body_normal: wp.array(dtype=wp.vec3), face: int, 
         + v * body_normal[indices[3 * face + 1]]
         + (1.0 - u - v) * body_normal[indices[3 * face + 2]]
     )
+
+
+@wp.func
+def ball_among(
+    mesh: wp.uint64, body_normal: wp.array(dtype=wp.vec3), x: wp.vec3, place: wp.vec3, n: wp.vec3, radius: wp.float32
+):
+    """Return the middle nearest to x of the balls of a radius that no side of a groove cuts, and the number of its sides.
+
+    It moves no farther than x does, whichever side is the nearest. The sides are planes; the projection is that of Hildreth (1957).
+    place, n: the nearest place of the mesh and the normal there.
+    """
+    normal = mat83()
+    least = vec8()
+    push = vec8()
+    middle = x
+    sides = int(0)
+    while sides < SIDES:
+        normal[sides] = n
+        least[sides] = wp.dot(place, n) + radius
+        sides += 1
+        sweep = int(0)
+        while sweep < SWEEPS:
+            for k in range(sides):
+                more = wp.max(push[k] + least[k] - wp.dot(middle, normal[k]), 0.0)
+                middle += normal[k] * (more - push[k])
+                push[k] = more
+            sweep += 1
+        other = wp.mesh_query_point_no_sign(mesh, middle, HITS * radius)
+        if not other.result:
+            break
+        place = wp.mesh_eval_position(mesh, other.face, other.u, other.v)
+        n = normal_at(mesh, body_normal, other.face, other.u, other.v)
+    return middle, sides
 
 
 @wp.kernel
@@ -68,20 +104,11 @@ def find_planes(
         x = wp.vec3(wp.float32(p[0]), wp.float32(p[1]), wp.float32(p[2]))
         turned = wp.dot(before, before) > 0.5 and wp.dot(before, n) < TURNED
         if (rolled or turned) and wp.dot(x - place, n) < largest:
-            middle = place + n * largest
-            turn = int(0)
-            while turn < TURNS:
-                other = wp.mesh_query_point_no_sign(mesh, middle, HITS * largest)
-                if not other.result:
-                    break
-                away = middle - wp.mesh_eval_position(mesh, other.face, other.u, other.v)
-                side = normal_at(mesh, body_normal, other.face, other.u, other.v)
-                middle += side * (largest - wp.dot(away, side))
-                turn += 1
+            middle, sides = ball_among(mesh, body_normal, x, place, n, largest)
             inwards = wp.normalize(middle - x)
             if (
-                turn > 0
-                and turn < TURNS
+                sides > 1
+                and sides < SIDES
                 and wp.length(middle - place) < SHARPEST * largest
                 and wp.dot(inwards, n) > 0.0
             ):

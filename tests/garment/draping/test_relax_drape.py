@@ -7,6 +7,7 @@ import pytest
 import warp as wp
 from cloths import cloth_of, cylinder_body, cylinder_cloth, grid, sheet
 from scipy.integrate import solve_bvp
+from scipy.optimize import nnls
 from warpflat.kernels.drape_contact import find_planes
 
 from warpflat.garment.draping.body import Body
@@ -139,3 +140,26 @@ def test_what_passes_to_the_other_side_of_a_groove_lies_in_a_ball_between_both()
     np.testing.assert_allclose(found[1][1][1], [-half, half, 0.0], atol=1e-6)
     middle = centre.numpy()[0] + radius * normal.numpy()[0]
     np.testing.assert_allclose(middle, [0.0, radius / half, 0.1], atol=1e-5)
+
+
+def test_the_ball_in_a_corner_of_three_sides_is_the_nearest_to_the_vertex_whichever_side_is_nearest():
+    """Sides that lean by different angles. The nearest middle that all three leave free is found by least squares of no negative pushes."""
+    rays = np.array([[1.0, 0.4, 0.0], [-0.4, 0.7, 0.9], [-0.6, 0.5, -0.9]])
+    sides = [np.array([np.zeros(3), rays[(k + 1) % 3], rays[k]]) for k in range(3)]
+    normals = np.array([np.cross(b, c) / np.linalg.norm(np.cross(b, c)) for _, b, c in sides])
+    assert (normals[:, 1] > 0.0).all()
+    corner = Body(np.concatenate(sides), np.arange(9, dtype=np.int32).reshape(3, 3), device=wp.get_device("cpu"))
+    radius, count = 0.02, 40
+    # On the skin all around the corner, so near that each ball touches at least two sides.
+    at = np.random.default_rng(4).uniform(-0.006, 0.006, (count, 3))
+    at[:, 1] = np.max(-(at[:, [0, 2]] @ normals[:, [0, 2]].T) / normals[:, 1], axis=1)
+    nearest = np.abs(at @ normals.T).argmin(axis=1)
+    assert set(nearest) == {0, 1, 2}
+    free = np.linalg.solve(normals, (radius - at @ normals.T).T).T
+    middles = at + np.array([nnls(normals.T, each)[0] for each in free]) @ normals
+    centre, normal = (wp.zeros(count, wp.vec3d, device="cpu") for _ in range(2))
+    ball = wp.full(count, radius, wp.float64, device="cpu")
+    inputs = [wp.uint64(corner.mesh.id), corner.normals, wp.array(at, dtype=wp.vec3d), 0.1, radius, 0]
+    wp.launch(find_planes, dim=count, inputs=inputs, outputs=[centre, normal, ball], device="cpu")
+    np.testing.assert_array_equal(ball.numpy(), np.float32(radius))
+    np.testing.assert_allclose(centre.numpy() + radius * normal.numpy(), middles, atol=1e-3 * radius)

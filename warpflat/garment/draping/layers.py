@@ -23,8 +23,9 @@ __all__ = ["APART", "Layers"]
 APART = 0.002
 # Stiffness between layers per area [N/m3]: a layer's weight presses by .2 mm. Ten times as stiff, hoods do not come to rest.
 _SKIN = 1e4
-# Another layer is looked for so far, and looked for again when a vertex has gone so far [m].
-_REACH, _HOLDS = 0.03, 0.005
+# Another layer is looked for so far [m], and looked for again when a vertex has gone by this share of an edge. Where it is looked for
+# more often, the layers in a fold of few edges take turns, and the cloth moves to and fro between them.
+_REACH, _HOLDS = 0.03, 0.5
 # Places of pieces lie so far apart where they are compared [m].
 _BETWEEN_PIECES = 100.0
 
@@ -41,6 +42,7 @@ class Layers:
     def __init__(self, cloth: SewnCloth, device: wp.Device) -> None:
         """Build the search tree of a cloth; no layer is near before `renew`."""
         self._surface, count = Body(cloth.designed, cloth.faces, device=device), len(cloth.designed)
+        self._holds = _HOLDS * float(np.sqrt(cloth.vertex_areas().mean()))
         near = cloth.laplacian()[0]
         self._near = [wp.array(each, dtype=wp.int32, device=device) for each in (near.indptr, near.indices)]
         piece = np.zeros(len(cloth.faces))
@@ -63,7 +65,7 @@ class Layers:
     def renew(self, positions: FloatArray) -> bool:
         """Look for the layers beside #V by 3 places [m], and return whether they were looked for: not where all is about as before."""
         count = len(positions)
-        if np.abs(positions - self._at).max() < _HOLDS:
+        if np.abs(positions - self._at).max() < self._holds:
             return False
         surface, device = self._surface, self._surface.device
         surface.move(positions)
