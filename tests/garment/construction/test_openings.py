@@ -94,12 +94,26 @@ def test_a_zip_in_one_side_leaves_left_and_right_one_pattern(mannequin: Mannequi
 def test_a_half_is_open_where_its_piece_was_on_its_side(mannequin: Mannequin):
     sides = ("side left", "side right")
     poncho = Form(name="poncho", pieces={"cloth": PieceRecipe(bricks=("shoulder-waist/*",), open=sides)})
-    zipped = part_at_centres(mannequin.layout, poncho, [ZIP.model_copy(update={"seam": "centre front"})])
+    zipped = part_at_centres(mannequin.layout, poncho, [ZIP, ZIP.model_copy(update={"seam": "centre front"})])
     assert {name: piece.open for name, piece in zipped.pieces.items()} == {
         "cloth_left": ("side left",),
         "cloth_right": ("side right",),
     }
     assert {"centre front", "centre back"} <= {seam.name for seam in mannequin.form(zipped).seams}
+
+
+def test_a_piece_that_goes_all_around_is_opened_at_one_centre_and_stays_one(mannequin: Mannequin):
+    """It had a seam at the other centre, too, for which nobody asked."""
+    tube = Form(name="tube", pieces={"cloth": PieceRecipe(bricks=("waist-knee/*",))})
+    form = mannequin.form(part_at_centres(mannequin.layout, tube, [ZIP]))
+    assert [seam.name for seam in form.seams] == ["centre back"]
+    skirt = flatten_form(mannequin, form, fabric="denim", curves_mm=0.0)
+    (cloth,) = draft_garment(opened(skirt, ZIP)).pieces[""]
+    assert "invisible zip 200 mm" in cloth.internal_lines
+    assert {notch.seam for notch in cloth.notches} == {"centre back"}
+    # Where it buttons, each half runs beyond the line.
+    buttons = OpeningTable(kind="buttons", seam="centre back")
+    assert list(part_at_centres(mannequin.layout, tube, [buttons]).pieces) == ["cloth_left", "cloth_right"]
 
 
 def test_halves_that_rest_a_little_apart_are_drawn_once(skirt: Garment):
