@@ -54,9 +54,10 @@ def summary_lines(
     if taken := metrics.get("pattern_of_file"):
         others.insert(0, cut_words(taken))
     if correction := metrics.get("drape", {}).get("correction"):
-        first, *_, last = (1e3 * each["misfit_m"] for each in correction["rounds"])
-        rounds = format_count(len(correction["rounds"]) - 1, "round")
-        others.insert(0, f"corrected: misfit {first:.2f} to {last:.2f} mm in {rounds}; {correction['reason']}")
+        misfits = [1e3 * each["misfit_m"] for each in correction["rounds"]]
+        rounds = format_count(len(misfits) - 1, "round")
+        change = f"misfit {misfits[0]:.2f} to {misfits[-1]:.2f} mm in {rounds}"
+        others.insert(0, f"corrected: {change}; {correction['reason']}")
     if failing and failing[0]["remedy"]:
         # One piece of a mesh for which no seams were looked for.
         alone = size and len(pieces) == 1 and "garment" not in metrics
@@ -88,6 +89,7 @@ def summary_lines(
         if line
     ]
     # As many names as fit into a line, at least one, and how many more there are.
+    listed = f"{shlex.quote(folder)}: no files"
     for shown in range(len(ordered), 0, -1):
         more = "" if shown == len(ordered) else f", {len(ordered) - shown} more"
         listed = f"{shlex.quote(folder)}: {', '.join(ordered[:shown])}{more}"
