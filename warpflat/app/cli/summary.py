@@ -9,7 +9,7 @@ from typing import Any
 
 from warpflat.app.cli.tables import cut_words
 from warpflat.app.review.figures import count_pieces
-from warpflat.core import energy_words, format_count
+from warpflat.core import energy_words, format_count, list_some
 from warpflat.garment import LACKING, NO_PATTERN
 
 __all__ = ["notes_line", "summary_lines"]
@@ -37,8 +37,7 @@ def summary_lines(
     pieces, verdict, lines = metrics["pieces"], metrics.get("verdict"), list[str]()
     unfinished = [name for name, piece in pieces.items() if not piece["stages"][-1]["converged"]]
     flips = sum(piece["flipped_faces"] for piece in pieces.values())
-    beyond = f" and {len(unfinished) - 3} more" if len(unfinished) > 3 else ""
-    wrong = [f"NOT at rest: {', '.join(unfinished[:3])}{beyond}"] if unfinished else []
+    wrong = [f"NOT at rest: {list_some(unfinished, 3)}"] if unfinished else []
     wrong += [format_count(flips, "flipped face")] if flips else []
     findings = verdict["findings"] if verdict else []
     failing, told = ([each for each in findings if each["fails"] is fails] for fails in (True, False))
