@@ -118,5 +118,6 @@ from .usd_process import read_apart as read_apart
 from .vectors import AXES as AXES
 from .vectors import laid_upon as laid_upon
 from .vectors import reflected as reflected
+from .vectors import turn_between as turn_between
 from .vectors import turned_left as turned_left
 from .vectors import unit as unit
