@@ -244,7 +244,7 @@ def _assert_every_edge_is_used_up_by_one_step(drafted: DraftedGarment) -> None:
     assert every <= {(piece, edge) for step in steps for piece, edges in step.sewn.items() for edge in edges}
     assert every <= joined | {(piece, other_side(edge)) for piece, edge in joined} | set(finished)
     # Each dart and each seam is sewn once, and what a step takes stands in the list.
-    letters = [seam.letter for seam in sewn_seams(drafted, only_size(drafted))]
+    letters = [seam.letter for seam in sewn_seams(sewing_steps(drafted, only_size(drafted)))]
     words = " ".join(step.words for step in steps)
     # Left and right, drawn once, have one letter.
     assert all(words.count(f" {letter} (") == letters.count(letter) for letter in letters)

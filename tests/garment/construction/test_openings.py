@@ -23,7 +23,7 @@ from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.edge_rules import EdgeRules
 from warpflat.pattern.drafting.pieces import Pattern, Piece
-from warpflat.pattern.drafting.sewing_order import sewn_seams
+from warpflat.pattern.drafting.sewing_order import sewing_steps, sewn_seams
 
 ZIP = OpeningTable(kind="zip", seam="centre back", length_mm=200)
 
@@ -75,7 +75,7 @@ def test_a_zip_in_one_side_leaves_left_and_right_one_pattern(mannequin: Mannequi
     pattern = opened(skirt, ZIP.model_copy(update={"seam": "side left"}))
     assert {p.name: p.quantity for p in pattern.pieces[""]} == {"front_left": 2, "back_left": 2}
     drafted = draft_garment(pattern)
-    sides = {seam.name: seam for seam in sewn_seams(drafted, "") if seam.name.startswith("side")}
+    sides = {seam.name: seam for seam in sewn_seams(sewing_steps(drafted, "")) if seam.name.startswith("side")}
     assert [(name, bool(seam.openings)) for name, seam in sides.items()] == [("side left", True), ("side right", False)]
     # One piece of paper has one letter at its side.
     assert len({seam.letter for seam in sides.values()}) == 1
