@@ -17,7 +17,7 @@ import shapely
 from obj_files import write_obj
 from polygons import corners_of, polygon, sides
 from polygons import drafted as drafted_alone
-from printed import faults
+from printed import drawn_faults
 from sample_dress import sample_dress
 from surface_meshes import quads_between
 
@@ -98,12 +98,10 @@ def test_sizes_lie_in_one_file(nest: Path):
 
 @pytest.mark.parametrize("paper", ["A4", "Letter"])
 def test_no_label_of_a_nest_is_cut_at_the_edge_of_a_sheet(nest: Path, dress: DraftedGarment, paper: str):
-    assert faults(read_pattern_json(nest / "pattern.json"), paper) == []
-    assert faults(dress, paper) == []
-    # A sheet's name lies on no line.
     for garment in (read_pattern_json(nest / "pattern.json"), dress):
-        printed = halved(garment)
-        tiling, drawings = draw_sheet(printed, paper)
+        faults, tiling, drawings = drawn_faults(garment, paper)
+        assert faults == []
+        # A sheet's name lies on no line.
         lines = [
             shapely.LineString(placed.on_sheet(stroke.points))
             for placed, sizes in zip(tiling.sheet.placed, drawings, strict=True)
