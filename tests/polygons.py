@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpflat.pattern.drafting.draft import draft_garment
-from warpflat.pattern.drafting.drafted import DraftedGarment
+from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.piece_parts import Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
 
@@ -81,3 +81,9 @@ def sewn(first: str, second: str, name: str = "", **more: Any) -> Seam:
 def drafted(*pieces: Piece, seams: Sequence[Seam] = (), name: str = "p") -> DraftedGarment:
     """The pattern of pieces in one size, drafted."""
     return draft_garment(Pattern(name=name, pieces={"": pieces}, seams=seams))
+
+
+def drafted_piece(piece: Piece, *, name: str = "p", tolerance: float | None = None) -> DraftedPiece:
+    """A piece, drafted as the only one of its pattern, whose corners nothing trues."""
+    pattern = Pattern(name=name, pieces={piece.size: [piece]})
+    return draft_garment(pattern, tolerance=tolerance, true=False).pieces[piece.size][0]

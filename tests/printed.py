@@ -7,22 +7,25 @@ from collections.abc import Iterator
 import shapely
 
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
+from warpflat.pattern.drafting.drawing import Drawing
 from warpflat.pattern.drafting.half_pieces import halved
 from warpflat.pattern.drafting.words import printed_in
 from warpflat.pattern.export.pdf import draw_sheet
+from warpflat.pattern.export.pdf_tiling import Tiling
 
 # What is drawn on a border may lie beyond it by this much [m].
 ON_BORDER = 2e-4
 
 
-def faults(garment: DraftedGarment, paper: str = "A4") -> list[str]:
-    """Return what lies outside its piece, whole and as it is printed, and what no sheet shows whole."""
+def drawn_faults(garment: DraftedGarment, paper: str = "A4") -> tuple[list[str], Tiling, list[tuple[Drawing, ...]]]:
+    """Return what lies outside its piece, whole and as it is printed, and what no sheet shows whole; and the sheet, as `draw_sheet`."""
     with printed_in(garment.garment.words):
         printed = halved(garment)
         found = [
             fault for kind in (garment, printed) for row in kind.pieces.values() for p in row for fault in _outside(p)
         ]
-        return [*dict.fromkeys(found), *_cut_at_sheets(printed, paper)]
+        tiling, drawings = draw_sheet(printed, paper)
+        return [*dict.fromkeys(found), *_cut_at_sheets(tiling, drawings)], tiling, drawings
 
 
 def _outside(piece: DraftedPiece) -> Iterator[str]:
@@ -50,9 +53,8 @@ def _outside(piece: DraftedPiece) -> Iterator[str]:
         yield f"{piece.name}: label is outside"
 
 
-def _cut_at_sheets(printed: DraftedGarment, paper: str) -> Iterator[str]:
+def _cut_at_sheets(tiling: Tiling, drawings: list[tuple[Drawing, ...]]) -> Iterator[str]:
     """Yield the words that no sheet shows whole."""
-    tiling, drawings = draw_sheet(printed, paper)
     corners = [tiling.corner(*tile) for tile in tiling.tiles]
     windows = [shapely.box(*corner, *(corner + tiling.paper.step + tiling.paper.overlap)) for corner in corners]
     for placed, sizes in zip(tiling.sheet.placed, drawings, strict=True):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from warpflat.core.text import LONGEST_LINE, LONGEST_WORD, dart_words, line_name, one_line
+from warpflat.core.text import LONGEST_LINE, LONGEST_WORD, dart_words, line_name, list_some, one_line
 
 
 def test_a_long_word_and_a_long_line_lose_their_middle() -> None:
@@ -17,6 +17,12 @@ def test_a_long_word_and_a_long_line_lose_their_middle() -> None:
 
 def test_lines_are_joined_and_control_characters_escaped() -> None:
     assert one_line("one\n  two\x1b[31m") == r"one two\x1b[31m"
+
+
+def test_a_list_is_cut_short_with_the_number_of_the_others() -> None:
+    assert list_some(["a", "b"], 2) == "a, b"
+    assert list_some(range(2000), 3) == "0, 1, 2 and 1,997 more"
+    assert list_some([]) == ""
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ import ezdxf
 import numpy as np
 import pytest
 from command import Command
+from polygons import drafted_piece
 
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.file_names import check_label, plain_label
@@ -23,7 +24,7 @@ from warpflat.core.toml_file import read_toml
 from warpflat.flat.surface.paths.lines import with_lines
 from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.flat.surface.shapes import make_shape
-from warpflat.pattern.drafting.draft import draft_garment, draft_piece
+from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.pattern.export.dxf import write_dxf
@@ -162,10 +163,10 @@ def test_texts_of_several_lines_and_large_numbers_are_read(tmp_path: Path):
 @pytest.mark.filterwarnings("error")
 def test_an_allowance_that_nothing_resolves_is_none():
     edges = [replace(edge, allowance=1e-308) for edge in square().edges]
-    drafted = draft_piece(replace(square(), edges=edges))
+    drafted = drafted_piece(replace(square(), edges=edges))
     np.testing.assert_array_equal(
         drafted.cut_line,
-        draft_piece(replace(square(), edges=[replace(edge, allowance=0.0) for edge in edges])).cut_line,
+        drafted_piece(replace(square(), edges=[replace(edge, allowance=0.0) for edge in edges])).cut_line,
     )
 
 

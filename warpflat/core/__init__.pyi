@@ -98,6 +98,7 @@ from .text import energy_words as energy_words
 from .text import find_unused_name as find_unused_name
 from .text import format_count as format_count
 from .text import line_name as line_name
+from .text import list_some as list_some
 from .text import name_without_number as name_without_number
 from .text import one_line as one_line
 from .text import other_side as other_side
@@ -117,5 +118,6 @@ from .usd_process import read_apart as read_apart
 from .vectors import AXES as AXES
 from .vectors import laid_upon as laid_upon
 from .vectors import reflected as reflected
+from .vectors import turn_between as turn_between
 from .vectors import turned_left as turned_left
 from .vectors import unit as unit

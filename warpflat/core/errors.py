@@ -7,7 +7,7 @@ import numbers
 from collections.abc import Collection, Iterable, Mapping
 from typing import TypeGuard
 
-from warpflat.core.text import one_line, quote_value
+from warpflat.core.text import list_some, one_line, quote_value
 
 __all__ = [
     "SIGNALS",
@@ -131,6 +131,5 @@ def nearest(word: str, valid: Iterable[str]) -> str:
     plain = {option.lower(): option for option in reversed(options)}
     close = difflib.get_close_matches(word[:LONGEST_COMPARED].lower(), plain, n=1, cutoff=0.5)
     guess = f"did you mean {quote_value(plain[close[0]])}? " if close else ""
-    listed = ", ".join(quote_value(option)[1:-1] for option in options[:MOST_LISTED])
-    more = f" and {len(options) - MOST_LISTED} more" if len(options) > MOST_LISTED else ""
-    return f"{guess}valid: {listed or 'none'}{more}"
+    listed = list_some((quote_value(option)[1:-1] for option in options), MOST_LISTED)
+    return f"{guess}valid: {listed or 'none'}"

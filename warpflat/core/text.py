@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterable, Sequence
 
 __all__ = [
     "MADE_TO_MEASURE",
@@ -14,6 +14,7 @@ __all__ = [
     "find_unused_name",
     "format_count",
     "line_name",
+    "list_some",
     "name_without_number",
     "one_line",
     "other_side",
@@ -40,6 +41,13 @@ _LETTERS = str.maketrans(
 def format_count(number: int, what: str) -> str:
     """Return a number with its noun: "1 piece", "2 pieces", "1,200 pieces"."""
     return f"{number:,} {what}" + ("" if number == 1 else "s")
+
+
+def list_some(entries: Iterable[object], most: int = 8) -> str:
+    """Return the first of a list and the number of the others: "3, 4, 9 and 12 more"."""
+    row = list(entries)
+    shown = ", ".join(map(str, row[:most]))
+    return shown if len(row) <= most else f"{shown} and {len(row) - most:,} more"
 
 
 def area_words(area: float) -> str:

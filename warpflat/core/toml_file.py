@@ -6,7 +6,7 @@ import sys
 import types
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -26,9 +26,24 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 class Table(BaseModel):
-    """A frozen table of a file, without unknown keys, "1" for 1, or NaN."""
+    """A frozen table of a file, or made in a script, without unknown keys, "1" for 1, or NaN.
+
+    Raises:
+        InputError: the first thing that is wrong, as :func:`check_table` tells it.
+    """
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+    if not TYPE_CHECKING:  # which reads the fields
+
+        def __init__(self, **data: Any) -> None:
+            try:
+                super().__init__(**data)
+            except ValidationError as error:
+                raise _input_error(type(self), data, type(self).__name__, error) from None
+
+        # A table within a table is made without it, so that the message names the outer one's key.
+        __init__.__pydantic_base_init__ = True
 
     def given(self) -> dict[str, Any]:
         """Return what the file says, by its own keys; without what holds by default."""
@@ -74,7 +89,12 @@ def check_table(model: type[Model], data: Mapping[str, Any], where: str = "") ->
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        problems = error.errors(include_url=False)
+        raise _input_error(model, data, where, error) from None
+
+
+def _input_error(model: type[BaseModel], data: Mapping[str, Any], where: str, error: ValidationError) -> InputError:
+    """Return the first thing that is wrong with data, in one line; `where` begins it."""
+    problems = error.errors(include_url=False)
     # A misspelled key is usually also a missing one: report the cause, not the consequence.
     problems.sort(key=lambda p: p["type"] != "extra_forbidden")
     problem = problems[0]
@@ -119,7 +139,7 @@ def check_table(model: type[Model], data: Mapping[str, Any], where: str = "") ->
                 options = [str(x) for m in _members(parent) if get_origin(m) is Literal for x in get_args(m)]
                 words += f"; {nearest(str(given), options)}" if options else ""
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-    raise InputError(f"{': '.join(filter(None, (where, path, words)))}{more}")
+    return InputError(f"{': '.join(filter(None, (where, path, words)))}{more}")
 
 
 def _members(annotation: Any) -> Iterator[Any]:

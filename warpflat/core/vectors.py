@@ -6,7 +6,7 @@ import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["AXES", "laid_upon", "reflected", "turned_left", "unit"]
+__all__ = ["AXES", "laid_upon", "reflected", "turn_between", "turned_left", "unit"]
 
 # A vector shorter than this has no direction, and stays as short.
 _SHORTEST = 1e-300
@@ -22,6 +22,11 @@ def unit(vectors: FloatArray) -> FloatArray:
 def turned_left(vectors: FloatArray) -> FloatArray:
     """Return vectors (#N by 2) turned to the left by a right angle."""
     return np.stack([-vectors[:, 1], vectors[:, 0]], axis=1)
+
+
+def turn_between(a: FloatArray, b: FloatArray) -> float:
+    """Return the angle [rad] by which a vector in the plane turns to another one, to the left positive."""
+    return float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
 
 
 def reflected(points: FloatArray, normal: FloatArray, offset: float = 0.0) -> FloatArray:

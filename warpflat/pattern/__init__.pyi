@@ -94,6 +94,7 @@ from .export.read_pattern import PATTERN_ENDINGS as PATTERN_ENDINGS
 from .export.read_pattern import read_pattern as read_pattern
 from .export.read_svg import read_svg as read_svg
 from .export.sewn_usd import write_sewn_usd as write_sewn_usd
+from .export.svg import write_overlay_svg as write_overlay_svg
 from .export.usd import DRAFTED as DRAFTED
 from .export.usd import FrameWriter as FrameWriter
 from .export.usd import film_scale as film_scale

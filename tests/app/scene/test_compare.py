@@ -76,7 +76,7 @@ def test_files_and_table(comparison: Comparison, tmp_path: Path):
     assert (tmp_path / "compare.png").read_bytes().startswith(b"\x89PNG")
 
     root = ET.parse(tmp_path / "compare.svg").getroot()
-    paths = {p.get("id"): p.get("d") for p in root.iter("{http://www.w3.org/2000/svg}path")}
+    paths = {p.get("id"): p.get("d") for p in root.iter("{http://www.w3.org/2000/svg}path") if p.get("id")}
     assert set(paths) == {"front.denim", "front.jersey", "front.power-net"}
     for fabric in comparison.fabrics:
         drawn = np.array([[float(x) for x in at[1:].split(",")] for at in paths[f"front.{fabric}"].split(" ")[:-1]])

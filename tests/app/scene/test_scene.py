@@ -101,6 +101,15 @@ def test_the_cloth_of_a_correction_is_looked_for_before_anything_is_made(tmp_pat
         plan_scene(load_scene(write_scene(tmp_path, f"{start}'mien'\n")))
 
 
+def test_the_cloth_of_a_correction_is_judged_by_the_limit_of_shear_that_the_scene_allows(tmp_path: Path):
+    start = "fabric = 'denim'\nshear_limit = 6.0\n[surface]\nshape = 'dome'\n[drape]\ncorrect_fabric = "
+    cloth = fabric_of_correction(load_scene(write_scene(tmp_path, f"{start}'woven'\n")))
+    assert cloth is not None
+    assert cloth.shear_limit == 6.0
+    with pytest.raises(InputError, match="shear_limit: a limit of shear says nothing of paper"):
+        plan_scene(load_scene(write_scene(tmp_path, f"{start}'paper'\n")))
+
+
 def test_scenes_and_fabrics_may_begin_with_a_byte_order_mark(tmp_path: Path):
     write_scene(tmp_path, "\ufeff[mine]\nbase = 'denim'\nshear_stiffness = 40.0\n", "cloth.toml")
     text = "\ufefffabric = 'mine'\nfabric_files = ['cloth.toml']\n[surface]\nshape = 'dome'\n"

@@ -92,6 +92,11 @@ def test_the_console_is_a_line_each_and_none_is_wide(skirt):
     *_, printed, listed = summary_lines(result.metrics, [*result.files, "pattern.pdf"], "my out")
     assert printed == "print 'my out/pattern.pdf'"
     assert listed.startswith("'my out': ")
+    assert summary_lines(result.metrics, [], "my out")[-1] == "'my out': no files"
+    # A correction may end before its first round.
+    ended = {"rounds": [{"misfit_m": 1e-3}], "reason": "no step lowers the misfit"}
+    words = summary_lines({"pieces": {}, "drape": {"correction": ended}}, [], "out")
+    assert "  corrected: misfit 1.00 to 1.00 mm in 0 rounds; no step lowers the misfit" in words
     assert max(map(len, lines)) <= 100
     assert "-0.0" not in " ".join(lines)
     guessed = sum("guess" not in note and " cm is " in note for note in result.notes)

@@ -142,14 +142,14 @@ def test_drag_a_dart_and_save(tmp_path: Path) -> None:
             )
             wait_for(lambda: abs(client.camera.aspect - width / height) < 0.01)
             wait_for(lambda: np.allclose(client.camera.position[:2], 0.0) and client.camera.fov < 0.5)
-            wait_for(lambda: page.stage.handle_position("trial: tip of bust") is not None)
+            wait_for(lambda: "trial: tip of bust" in page.stage._handles)
             # A browser that draws in software may still be setting its camera, and a drag beside the tip turns the form: look from the
             # front again, and drag where the tip is seen by then.
             for _ in range(8):
                 browser.press("Front")
                 time.sleep(1.5)
                 tip, mouth = (
-                    page.stage.handle_position(f"trial: {name}") for name in ("tip of bust", "mouth of bust, left")
+                    place_of_handle(page.stage, f"trial: {name}") for name in ("tip of bust", "mouth of bust, left")
                 )
                 inwards = (tip - mouth) / np.linalg.norm(tip - mouth)
                 ends = [on_screen(client.camera, place, width, height) for place in (tip, tip + 0.05 * inwards)]
@@ -189,6 +189,11 @@ def wait_for(what, seconds: float = 60.0):
             return found
         time.sleep(0.05)
     raise AssertionError("it did not come true")
+
+
+def place_of_handle(stage, name: str) -> np.ndarray:
+    """Where a point that can be dragged is seen [m]."""
+    return np.asarray(stage._pattern.position) + stage._turn @ np.asarray(stage._handles[name].position)
 
 
 def on_screen(camera, point, width: float, height: float) -> tuple[float, float]:

@@ -365,6 +365,17 @@ def test_stop_keeps_what_has_been_reached_and_frames_come_ten_a_second(tmp_path:
     assert [watch.is_time("a"), watch.is_time("a"), watch.is_time("b")] == [True, False, True]
 
 
+def test_plain_steps_are_of_cloth_worn_as_the_scene_says(tmp_path: Path) -> None:
+    """Cloth that is worn 10 % longer than flat comes to rest a tenth smaller, step by step as in a run."""
+    session = bodice(tmp_path, wear={"stretch_warp": 0.1, "stretch_weft": 0.1}, fabric="jersey")
+    frames = list[PieceFrame]()
+    session._on_frame = lambda name, frame: frames.append(frame)
+    session.watch("trial")
+    assert session.solution is not None
+    piece = session.solution.pieces["trial"]
+    np.testing.assert_allclose(np.ptp(frames[-1].positions, axis=0), np.ptp(piece.positions, axis=0), rtol=5e-3)
+
+
 def test_clicks_find_pieces_and_lines() -> None:
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     faces = np.array([[0, 1, 2, 3]], dtype=np.int32)

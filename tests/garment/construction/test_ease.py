@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -123,6 +124,22 @@ def test_a_wrong_wish_is_told_in_one_line(shirt: FormResult, wish: SeamTable, me
     assert "\n" not in str(caught.value)
     with pytest.raises(InputError, match="is named twice"):
         seam_ratios(shirt, [WISHES[0], SeamTable(name="back armhole left", fullness=0.1)])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"name": "side left"}, "SeamTable: give either fullness = 0.02"),
+        ({"name": "side left", "gather": 9}, "SeamTable: gather: should be less than or equal to 5, got 9"),
+        ({"name": "side left", "gahter": 1.5}, "SeamTable: gahter: unknown key 'gahter'; did you mean 'gather'?"),
+        ({"fullness": 0.02}, "SeamTable: name: is missing"),
+    ],
+)
+def test_a_wish_that_cannot_be_is_told_in_one_line(wrong: dict[str, Any], message: str):
+    with pytest.raises(InputError) as caught:
+        SeamTable(**wrong)
+    assert str(caught.value).startswith(message)
+    assert "\n" not in str(caught.value)
 
 
 # --- what comes out

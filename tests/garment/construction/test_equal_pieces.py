@@ -18,7 +18,7 @@ from warpflat.pattern.drafting.label import cutting_words
 from warpflat.pattern.drafting.piece_parts import Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
 from warpflat.pattern.drafting.seam_words import seam_words, seams_of_words
-from warpflat.pattern.drafting.sewing_order import sewn_seams
+from warpflat.pattern.drafting.sewing_order import sewing_steps, sewn_seams
 from warpflat.pattern.drafting.whole_pieces import whole_pieces
 from warpflat.pattern.export.pattern_json import pattern_from_json, pattern_json
 
@@ -63,8 +63,8 @@ def test_gores_that_are_equal_are_cut_from_one_and_all_their_seams_are_told() ->
     # Notches of one letter meet, as far from the tip.
     drafted = draft_garment(pattern)
     notches = {notch.edge: notch for notch in drafted.pieces[""][0].notches}
-    assert {seam.letter for seam in sewn_seams(drafted, "")} == {"A"}
-    assert sewn_seams(drafted, "")[0].count == 6
+    assert {seam.letter for seam in sewn_seams(sewing_steps(drafted, ""))} == {"A"}
+    assert sewn_seams(sewing_steps(drafted, ""))[0].count == 6
     assert notches["edge 0"].at == pytest.approx(notches["edge 1"].at * [-1.0, 1.0], abs=4e-4)
     # Files tell all of it again, and what is sewn has all six.
     assert list(pattern_from_json(pattern_json(drafted)).garment.seams) == list(pattern.seams)

@@ -23,7 +23,7 @@ from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.edge_rules import EdgeRules
 from warpflat.pattern.drafting.pieces import Pattern, Piece
-from warpflat.pattern.drafting.sewing_order import sewn_seams
+from warpflat.pattern.drafting.sewing_order import sewing_steps, sewn_seams
 
 ZIP = OpeningTable(kind="zip", seam="centre back", length_mm=200)
 
@@ -75,7 +75,7 @@ def test_a_zip_in_one_side_leaves_left_and_right_one_pattern(mannequin: Mannequi
     pattern = opened(skirt, ZIP.model_copy(update={"seam": "side left"}))
     assert {p.name: p.quantity for p in pattern.pieces[""]} == {"front_left": 2, "back_left": 2}
     drafted = draft_garment(pattern)
-    sides = {seam.name: seam for seam in sewn_seams(drafted, "") if seam.name.startswith("side")}
+    sides = {seam.name: seam for seam in sewn_seams(sewing_steps(drafted, "")) if seam.name.startswith("side")}
     assert [(name, bool(seam.openings)) for name, seam in sides.items()] == [("side left", True), ("side right", False)]
     # One piece of paper has one letter at its side.
     assert len({seam.letter for seam in sides.values()}) == 1
@@ -94,12 +94,26 @@ def test_a_zip_in_one_side_leaves_left_and_right_one_pattern(mannequin: Mannequi
 def test_a_half_is_open_where_its_piece_was_on_its_side(mannequin: Mannequin):
     sides = ("side left", "side right")
     poncho = Form(name="poncho", pieces={"cloth": PieceRecipe(bricks=("shoulder-waist/*",), open=sides)})
-    zipped = part_at_centres(mannequin.layout, poncho, [ZIP.model_copy(update={"seam": "centre front"})])
+    zipped = part_at_centres(mannequin.layout, poncho, [ZIP, ZIP.model_copy(update={"seam": "centre front"})])
     assert {name: piece.open for name, piece in zipped.pieces.items()} == {
         "cloth_left": ("side left",),
         "cloth_right": ("side right",),
     }
     assert {"centre front", "centre back"} <= {seam.name for seam in mannequin.form(zipped).seams}
+
+
+def test_a_piece_that_goes_all_around_is_opened_at_one_centre_and_stays_one(mannequin: Mannequin):
+    """It had a seam at the other centre, too, for which nobody asked."""
+    tube = Form(name="tube", pieces={"cloth": PieceRecipe(bricks=("waist-knee/*",))})
+    form = mannequin.form(part_at_centres(mannequin.layout, tube, [ZIP]))
+    assert [seam.name for seam in form.seams] == ["centre back"]
+    skirt = flatten_form(mannequin, form, fabric="denim", curves_mm=0.0)
+    (cloth,) = draft_garment(opened(skirt, ZIP)).pieces[""]
+    assert "invisible zip 200 mm" in cloth.internal_lines
+    assert {notch.seam for notch in cloth.notches} == {"centre back"}
+    # Where it buttons, each half runs beyond the line.
+    buttons = OpeningTable(kind="buttons", seam="centre back")
+    assert list(part_at_centres(mannequin.layout, tube, [buttons]).pieces) == ["cloth_left", "cloth_right"]
 
 
 def test_halves_that_rest_a_little_apart_are_drawn_once(skirt: Garment):

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 import shapely
 from obj_files import write_obj
-from polygons import corners_of, polygon, sides
+from polygons import corners_of, drafted_piece, polygon, sides
 from polygons import drafted as drafted_alone
-from printed import faults
+from printed import drawn_faults
 from sample_dress import sample_dress
 from surface_meshes import quads_between
 
@@ -35,7 +35,7 @@ from warpflat.garment.construction.to_pattern import check_edge_names, pattern_o
 from warpflat.garment.mannequin.forms import FormResult
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.pattern.drafting.curves import fit_curve
-from warpflat.pattern.drafting.draft import draft_garment, draft_piece
+from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.edge_rules import EdgeRules
 from warpflat.pattern.drafting.half_pieces import halved
@@ -98,12 +98,10 @@ def test_sizes_lie_in_one_file(nest: Path):
 
 @pytest.mark.parametrize("paper", ["A4", "Letter"])
 def test_no_label_of_a_nest_is_cut_at_the_edge_of_a_sheet(nest: Path, dress: DraftedGarment, paper: str):
-    assert faults(read_pattern_json(nest / "pattern.json"), paper) == []
-    assert faults(dress, paper) == []
-    # A sheet's name lies on no line.
     for garment in (read_pattern_json(nest / "pattern.json"), dress):
-        printed = halved(garment)
-        tiling, drawings = draw_sheet(printed, paper)
+        faults, tiling, drawings = drawn_faults(garment, paper)
+        assert faults == []
+        # A sheet's name lies on no line.
         lines = [
             shapely.LineString(placed.on_sheet(stroke.points))
             for placed, sizes in zip(tiling.sheet.placed, drawings, strict=True)
@@ -369,7 +367,7 @@ def test_two_ragged_sides_of_a_dart_are_smoothed_alike_and_stay_equally_long():
     corners = np.array([right[0], (0.4, 0.0), (0.4, 0.5), (0.0, 0.5), (0.0, 0.0), left[0]])
     edges = [Edge(name="l", points=left, kind="dart"), Edge(name="r", points=right[::-1], kind="dart")]
     edges += sides(corners, closed=False)
-    piece = draft_piece(Piece(name="p", edges=edges, darts=[Dart(name="d", left="l", right="r", cut=True)]))
+    piece = drafted_piece(Piece(name="p", edges=edges, darts=[Dart(name="d", left="l", right="r", cut=True)]))
     first, second = piece.edge("l"), piece.edge("r")
     assert first.tolerance == second.tolerance > 1e-4
     assert first.length == pytest.approx(second.length, abs=2e-4)

@@ -97,7 +97,7 @@ def test_opening_of_bags_is_notched_on_both_sides_of_the_seam():
     (bags,) = [step.words for step in sewing_steps(drafted, "") if step.technique == "inseam_bag"]
     assert "there the seam stays open" in bags
     # Two of the four bags are one pocket.
-    assert [seam.count for seam in sewn_seams(drafted, "") if seam.name == "pocket bag"] == [2]
+    assert [seam.count for seam in sewn_seams(sewing_steps(drafted, "")) if seam.name == "pocket bag"] == [2]
     with pytest.raises(InputError, match=r"ends 800 mm along 'side left'"):
         add_pockets(skirt(), [PocketTable(kind="inseam", seam="side left", width_mm=150, height_mm=400, below_mm=400)])
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from flat_forms import flat_form, pattern_of, whole_draft
 
+from warpflat.app.cli.fit_lines import wearer_words
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.garment.construction.details import FinishingTable, OpeningTable
@@ -79,6 +80,12 @@ def test_a_rib_is_in_girths_rings_and_seams(shirt: Garment, tmp_path: Path):
     share = after["hip"]["length_mm"] / before["hip"]["length_mm"]
     assert after["hip"]["stretched_mm"] == pytest.approx(share * before["hip"]["stretched_mm"])
     assert after["neck"] == before["neck"]
+    # What is said of the wearer is the same ease: at the hip that of the rib, which is shorter than the way around the hip.
+    wear = shirt.metrics()["wear"]
+    told, drawn_in = (wearer_words(wear["wearer"], girths) for girths in (plain["girths"], drawn["girths"]))
+    ease, of_cloth = (f"hip {100 * each['girths']['hip']['ease_m']:+.1f} cm" for each in (drawn, plain))
+    assert of_cloth in told
+    assert f"stretched at {ease} (" in drawn_in
     for name, cut in (("side left", 60.0), ("shoulder left", 0.0)):
         was, now = (next(seam for seam in each["seams"] if seam["name"] == name) for each in (plain, drawn))
         assert np.subtract(was["length_mm"], now["length_mm"]) == pytest.approx([cut, cut], abs=0.5)

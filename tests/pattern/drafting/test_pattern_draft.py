@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
-from polygons import corners_of, polygon, sides
+from polygons import corners_of, drafted_piece, polygon, sides
 from polygons import drafted as drafted_alone
 from sample_dress import sample_dress
 
@@ -21,7 +21,7 @@ from warpflat.core.left_out import LeftOut, listening_to_left_out
 from warpflat.core.polyline import arc_lengths, turning_angles
 from warpflat.pattern.drafting import draft
 from warpflat.pattern.drafting.curves import fit_curve
-from warpflat.pattern.drafting.draft import draft_garment, draft_piece, nest_label
+from warpflat.pattern.drafting.draft import draft_garment, nest_label
 from warpflat.pattern.drafting.drawing import OnPaper, draw_nest, draw_piece
 from warpflat.pattern.drafting.fitting import uncrossed
 from warpflat.pattern.drafting.layout import lay_out, nests
@@ -161,7 +161,7 @@ def test_the_back_is_double_the_front_is_single(dress):
 def test_words_on_a_fold_are_read_upwards_as_all_words_along_steep_lines(lean: float) -> None:
     corners = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.4), (lean, 0.4)]
     half = polygon("half", corners, kinds=("seam", "seam", "seam", "fold"), grain=np.array([(0.1, 0.1), (0.1, 0.3)]))
-    (said,) = [words for words in draw_piece(draft_piece(half)).words if words.text == "PLACE ON FOLD"]
+    (said,) = [words for words in draw_piece(drafted_piece(half)).words if words.text == "PLACE ON FOLD"]
     assert np.degrees(said.angle) == pytest.approx(90.0, abs=6.0)
 
 
@@ -305,7 +305,7 @@ def test_notches_of_a_dart_through_a_straight_hem_stand_as_its_legs_do_above_it(
     corners = [(0, 0), (0.15, 0), (0.18, 0.2), (0.21, 0), (0.36, 0), (0.36, 0.3), (0, 0.3)]
     kinds = ("hem", "dart", "dart", "hem", "seam", "seam", "seam")
     darts = [Dart(name="d", left="e1", right="e2")]
-    piece = draft_piece(polygon("p", corners, kinds=kinds, widths=7 * [0.04], darts=darts))
+    piece = drafted_piece(polygon("p", corners, kinds=kinds, widths=7 * [0.04], darts=darts))
     left, right = (next(n.base[0] for n in piece.notches if n.edge == leg) for leg in ("e1", "e2"))
     assert left[1] == pytest.approx(-0.04, abs=1e-6)
     # 60 mm at the hem, 48 mm 40 mm above it, and as much where that much is turned up.
@@ -314,7 +314,7 @@ def test_notches_of_a_dart_through_a_straight_hem_stand_as_its_legs_do_above_it(
 
 def test_a_wide_dart_is_cut_out_with_allowances_on_its_legs():
     edges = sides(DARTED, names=("a", "l", "r", "b", "right", "top", "left"), kinds=KINDS)
-    piece = draft_piece(Piece(name="p", edges=edges, darts=[Dart(name="d", left="l", right="r", cut=True)]))
+    piece = drafted_piece(Piece(name="p", edges=edges, darts=[Dart(name="d", left="l", right="r", cut=True)]))
     assert piece.edge("l").width == 0.010
     assert "Includes seam 1 cm" in [text for text, _ in piece.label.lines]
     shift = piece.frame[:, 2]
@@ -322,7 +322,7 @@ def test_a_wide_dart_is_cut_out_with_allowances_on_its_legs():
     assert cut.is_valid
     assert not cut.contains(shapely.Point(0.15, 0.0)), "the wedge is cut away"
     assert piece.darts[0].fold is None
-    folded = draft_piece(Piece(name="p", edges=edges, darts=[Dart(name="d", left="l", right="r")]))
+    folded = drafted_piece(Piece(name="p", edges=edges, darts=[Dart(name="d", left="l", right="r")]))
     assert shapely.Polygon(folded.cut_line - folded.frame[:, 2]).contains(shapely.Point(0.15, 0.0))
 
 
@@ -377,13 +377,13 @@ def test_a_dart_with_room_is_cut_away_and_notched_where_its_allowances_are_apart
 def test_the_label_tells_the_allowances_of_a_dart_that_is_cut_away(cut, said):
     widths = (0.006, None, 0.01, 0.006, 0.006, 0.006, 0.006)
     darts = [Dart(name="d", left="e1", right="e2", cut=cut)]
-    piece = draft_piece(polygon("p", DARTED, kinds=KINDS, widths=widths, darts=darts))
+    piece = drafted_piece(polygon("p", DARTED, kinds=KINDS, widths=widths, darts=darts))
     assert f"Includes {said}" in [text for text, _ in piece.label.lines]
 
 
 def test_legs_of_different_length_are_noted():
     corners = [(0, 0), (0.1, 0), (0.12, 0.15), (0.14, 0.004), (0.3, 0), (0.3, 0.3), (0, 0.3)]
-    piece = draft_piece(polygon("p", corners, kinds=KINDS, darts=[Dart(name="d", left="e1", right="e2")]))
+    piece = drafted_piece(polygon("p", corners, kinds=KINDS, darts=[Dart(name="d", left="e1", right="e2")]))
     assert any("legs differ by 0.39 cm" in note or "legs differ by 0.4 cm" in note for note in piece.notes)
 
 
@@ -393,14 +393,14 @@ def test_legs_of_different_length_are_noted():
 )
 def test_notes_that_are_printed_are_in_the_units_of_the_pattern(units, said):
     pleat = Dart(name="d", left="e1", right="e2", pleat=0.08)
-    piece = draft_piece(replace(polygon("p", DARTED, kinds=KINDS, darts=[pleat]), units=units))
+    piece = drafted_piece(replace(polygon("p", DARTED, kinds=KINDS, darts=[pleat]), units=units))
     assert piece.notes == (f"pleat d: {said} down from the edge",)
 
 
 def test_a_fisheye_dart_is_marked_not_cut():
     eye = Hole(name="waist", kind="dart", points=np.array([(0.1, 0.05), (0.11, 0.15), (0.1, 0.25), (0.09, 0.15)]))
     out = Hole(name="pocket", points=np.array([(0.02, 0.02), (0.04, 0.02), (0.04, 0.04)]))
-    piece = draft_piece(square(holes=[eye, out]))
+    piece = drafted_piece(square(holes=[eye, out]))
     assert set(piece.fisheyes) == {"waist"}
     assert set(piece.cutouts) == {"pocket"}
     tips = np.array([hole.at - piece.frame[:, 2] for hole in piece.drill_holes])
@@ -414,7 +414,7 @@ def test_a_hole_gets_its_allowance_inwards_or_a_note():
         Hole(name="eyelet", points=[0.15, 0.15] + 0.015 * corners),
         Hole(name="raw", points=[0.15, 0.05] + 0.015 * corners, allowance=0.0),
     ]
-    piece = draft_piece(square(holes=holes))
+    piece = drafted_piece(square(holes=holes))
     vent, eyelet, raw = (piece.cutouts[name] for name in ("vent", "eyelet", "raw"))
     assert vent.width == 0.010
     assert shapely.Polygon(vent.sew_line).area == pytest.approx(0.05**2)
@@ -450,13 +450,13 @@ def test_a_fisheye_dart_that_overlaps_is_no_dart(points, message):
 
 def test_sides_of_a_fisheye_dart_may_touch():
     points = [(0.1, 0.05), (0.1002, 0.08), (0.102, 0.15), (0.1, 0.25), (0.098, 0.15), (0.1003, 0.08)]
-    piece = draft_piece(square(holes=[Hole(name="waist", kind="dart", points=np.array(points))]))
+    piece = drafted_piece(square(holes=[Hole(name="waist", kind="dart", points=np.array(points))]))
     assert set(piece.fisheyes) == {"waist"}
 
 
 def test_the_grain_points_up_and_nothing_is_scaled():
     grain = np.array([(0.05, 0.05), (0.15, 0.15)])
-    piece = draft_piece(square(grain=grain))
+    piece = drafted_piece(square(grain=grain))
     assert piece.grain[1, 0] == pytest.approx(piece.grain[0, 0])
     assert piece.grain[1, 1] > piece.grain[0, 1]
     assert piece.frame[:, :2] @ piece.frame[:, :2].T == pytest.approx(np.eye(2))
@@ -482,7 +482,7 @@ def frame(rim, name="frame", size="", **options):
 @pytest.mark.parametrize("rim", [0.08, 0.06, 0.03, 0.02, 0.012])
 def test_labels_stand_on_the_cloth_not_in_a_hole(rim):
     piece, cloth = frame(rim)
-    drafted = draft_piece(piece, garment="a rather long name of a garment")
+    drafted = drafted_piece(piece, name="a rather long name of a garment")
     moved = shapely.transform(cloth, lambda points: points @ drafted.frame[:, :2].T + drafted.frame[:, 2])
     assert drafted.label.leader is None
     assert moved.covers(shapely.Polygon(drafted.label.box))
@@ -492,7 +492,7 @@ def test_labels_stand_on_the_cloth_not_in_a_hole(rim):
 
 def test_a_label_without_room_stands_beside_the_piece_with_a_leader_to_it():
     piece, cloth = frame(0.004)
-    drafted = draft_piece(piece, garment="tiny")
+    drafted = drafted_piece(piece, name="tiny")
     moved = shapely.transform(cloth, lambda points: points @ drafted.frame[:, :2].T + drafted.frame[:, 2])
     label, cut = drafted.label, shapely.Polygon(drafted.cut_line)
     assert not cut.intersects(shapely.Polygon(label.box))
@@ -527,7 +527,7 @@ def test_a_label_beside_a_piece_has_its_room_on_the_sheet_and_stands_beside_all_
 )
 def test_no_letter_leaves_the_piece_or_crosses_its_grain(name, width, height):
     edges = [Edge(name=e.name, points=e.points * [width / 0.2, height / 0.3]) for e in square().edges]
-    drafted = draft_piece(square(name, edges=edges), garment="style")
+    drafted = drafted_piece(square(name, edges=edges), name="style")
     sewn, grain = shapely.Polygon(drafted.sew_line), shapely.LineString(drafted.grain)
     lines = [words for words in draw_piece(drafted).words if words.text not in {e.name for e in drafted.edges}]
     assert " ".join(words.text for words in lines).startswith(name.replace("_", " ").upper())
@@ -592,13 +592,13 @@ def test_a_seam_that_names_a_wrong_edge_says_the_nearest():
 def test_the_grain_lies_beside_a_line_along_it_and_not_upon_it(across: float):
     line = np.array([[across, 0.0], [across, 0.3]])
     grain = np.array([[0.1, 0.05], [0.1, 0.25]])
-    piece = draft_piece(square(internal_lines={"fold line": line}, grain=grain))
+    piece = drafted_piece(square(internal_lines={"fold line": line}, grain=grain))
     (drawn,) = piece.internal_lines.values()
     assert abs(drawn[0, 0] - piece.grain[0, 0]) > 0.003
     np.testing.assert_allclose(np.diff(piece.grain, axis=0), [[0.0, 0.2]], atol=1e-12)
     # A line across it moves nothing.
-    crossed = draft_piece(square(internal_lines={"level": np.array([[0.0, 0.1], [0.2, 0.1]])}, grain=grain))
-    plain = draft_piece(square(grain=grain))
+    crossed = drafted_piece(square(internal_lines={"level": np.array([[0.0, 0.1], [0.2, 0.1]])}, grain=grain))
+    plain = drafted_piece(square(grain=grain))
     np.testing.assert_array_equal(crossed.grain, plain.grain)
 
 

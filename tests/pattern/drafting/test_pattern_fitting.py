@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from polygons import corners_of, polygon, sides
+from polygons import corners_of, drafted_piece, polygon, sides
 
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.pattern.drafting.curves import chords, fit_curve
-from warpflat.pattern.drafting.draft import draft_piece
 from warpflat.pattern.drafting.fitting import as_in_layout, drawn_length, is_wavy, smooth_line
 from warpflat.pattern.drafting.piece_parts import Dart, Edge
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
@@ -56,7 +55,7 @@ def test_long_bends_one_way_and_the_other_are_shape():
             Edge(name="b", points=np.array([line[-1], (0.4, -0.2), (0.4, 0), line[0]])),
         ],
     )
-    edge = draft_piece(piece).edge("s")
+    edge = drafted_piece(piece).edge("s")
     assert edge.tolerance == 1e-4
     assert edge.fit_error < 1.1e-4
     assert not is_wavy(edge.curve)
@@ -65,7 +64,7 @@ def test_long_bends_one_way_and_the_other_are_shape():
 
 def test_teeth_that_no_smooth_line_can_be_as_long_as_are_told_of():
     legs = teeth(41, 0.005), np.linspace(0.0, 1.0, 41)[:, None] * [0.1, -np.sqrt(0.08 - 0.01)]
-    piece = draft_piece(dart_with(*legs))
+    piece = drafted_piece(dart_with(*legs))
     assert piece.edge("l").length == pytest.approx(piece.edge("r").length, abs=5e-4)
     assert [note for note in piece.notes if "stays ragged at l:" in note]
 
@@ -95,10 +94,10 @@ def test_a_clean_line_inside_stays_as_it_is(line: np.ndarray):
 def test_lines_are_smoothed_on_the_pattern_only_and_not_where_a_tolerance_is_asked_for():
     line = teeth(41, 0.005) + np.array([0.2, 0.3])
     piece = polygon("p", corners_of(0.4, 0.4), internal_lines={"level": line})
-    drafted = draft_piece(piece)
+    drafted = drafted_piece(piece)
     assert is_wavy(chords(piece.internal_lines["level"]))
     assert not is_wavy(chords(drafted.internal_lines["level"]))
-    as_asked = draft_piece(piece, tolerance=1e-4).internal_lines["level"]
+    as_asked = drafted_piece(piece, tolerance=1e-4).internal_lines["level"]
     np.testing.assert_allclose(as_asked - as_asked[0], line - line[0], atol=1e-12)
 
 
@@ -106,7 +105,7 @@ def test_a_sliver_narrower_than_its_tolerance_keeps_the_points_of_its_border():
     along = np.linspace(0.0, 0.2, 12)
     low = np.column_stack([along, -4e-4 * np.sin(np.pi * along / 0.2)])
     edges = [Edge(name="one", points=low), Edge(name="other", points=low[::-1] * [1, -1])]
-    drafted = draft_piece(Piece(name="p", edges=edges), tolerance=1e-3)
+    drafted = drafted_piece(Piece(name="p", edges=edges), tolerance=1e-3)
     assert min(np.ptp(drafted.sew_line, axis=0)) == pytest.approx(8e-4, rel=0.1)
 
 
@@ -117,7 +116,7 @@ def test_a_line_whose_curve_would_cross_itself_is_as_long_as_its_chords():
     ])  # fmt: skip
     neck = 1e-3 * np.concatenate([half, [(0.0, 571.5)], half[::-1] * [-1.0, 1.0]])
     assert drawn_length(neck) == pytest.approx(polyline_length(neck), abs=1e-9)
-    drafted = draft_piece(
+    drafted = drafted_piece(
         Piece(
             name="back",
             edges=[

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
+from polygons import drafted_piece
 from shapely.affinity import scale
 from surface_meshes import quads_between
 
 from warpflat.core.errors import InputError
 from warpflat.core.left_out import LeftOut, listening_to_left_out
-from warpflat.pattern.drafting.draft import draft_piece
 from warpflat.pattern.drafting.drawing import draw_piece
 from warpflat.pattern.drafting.from_mesh import MeshFeatures, piece_from_mesh
 
@@ -65,7 +65,7 @@ def test_edges_take_the_names_of_the_lines_along_them():
     assert list(piece.internal_lines) == ["level"]
     assert np.array_equal(piece.edge("side").vertices, index[:, -1])
     assert shapely.Polygon(piece.outline).area == pytest.approx(0.06)
-    assert len(draft_piece(piece).edge("side").curve.bezier) == 1
+    assert len(drafted_piece(piece).edge("side").curve.bezier) == 1
 
 
 def test_a_line_that_runs_along_two_stretches_names_both():
@@ -84,7 +84,7 @@ def test_a_crack_is_found_and_becomes_a_dart_that_folds():
     left, right = piece.edge("dart.left"), piece.edge("dart.right")
     assert left.length == pytest.approx(right.length)
     assert left.points[-1] == pytest.approx(flat[path[-1]])
-    drafted = draft_piece(piece)
+    drafted = drafted_piece(piece)
     cut = shapely.Polygon(drafted.cut_line)
     assert cut.is_valid
     assert cut.contains(shapely.Point(drafted.darts[0].tip - np.array([0, 0.1]))), "the wedge stays in the cloth"
@@ -123,7 +123,7 @@ def test_a_smooth_border_without_lines_is_one_closed_edge():
     faces = np.column_stack([np.zeros(72), ring, np.roll(ring, -1), np.full(72, -1)]).astype(np.int32)
     piece = make_piece(faces, flat, name="disc")
     assert len(piece.edges) == 1
-    cut = shapely.Polygon(draft_piece(piece).cut_line)
+    cut = shapely.Polygon(drafted_piece(piece).cut_line)
     assert cut.is_valid
     assert cut.area == pytest.approx(np.pi * 0.11**2, rel=2e-3)
 
@@ -137,7 +137,7 @@ def test_a_ragged_border_has_no_more_corners_than_its_shape():
     assert sorted(int(e.vertices[0]) for e in piece.edges) == sorted(
         [index[0, 0], index[0, -1], index[-1, 0], index[-1, -1]]
     )
-    assert shapely.Polygon(draft_piece(piece).cut_line).is_valid
+    assert shapely.Polygon(drafted_piece(piece).cut_line).is_valid
 
 
 def strap(width, step, across, bend=0.0):
@@ -174,7 +174,7 @@ def test_a_narrow_side_keeps_its_allowance_all_along():
         ("edge_2", 0.01),
         ("left", 0.8),
     ]
-    cut = draft_piece(piece).cut_line
+    cut = drafted_piece(piece).cut_line
     np.testing.assert_allclose(np.ptp(cut, axis=0), [0.05, 0.82], atol=1e-9)
 
 
@@ -244,7 +244,7 @@ def test_a_narrow_hollow_tip_has_its_corner_where_the_border_turns_and_an_even_a
     piece = make_piece(faces, flat, name="gore")
     ends = {int(edge.vertices[0]) for edge in piece.edges}
     assert ends <= {int(index[row, column]) for row in (0, -1) for column in (0, -1)}
-    cut = shapely.Polygon(draft_piece(piece).cut_line)
+    cut = shapely.Polygon(drafted_piece(piece).cut_line)
     assert cut.symmetric_difference(scale(cut, xfact=-1, origin=(0, 0))).area < 1e-5
 
 
@@ -261,7 +261,7 @@ def test_a_hole_that_lies_on_itself_is_not_cut_and_drawn_dashed():
     assert list(piece.internal_lines) == ["hole_1 left out"]
     assert [step.is_needed for step in heard] == [True]
     assert heard[0].note.startswith("hole_1 of kite is not cut, and drawn dashed: ")
-    strokes = draw_piece(draft_piece(piece)).strokes
+    strokes = draw_piece(drafted_piece(piece)).strokes
     assert [stroke.name for stroke in strokes if stroke.role == "left_out"] == ["hole_1 left out"]
 
 
@@ -282,4 +282,4 @@ def test_a_hole_that_meets_the_border_at_a_point_opens_there():
     assert outline.is_valid
     assert not piece.holes
     assert outline.area == pytest.approx(0.06 - 2 * cell, abs=1e-6)
-    assert shapely.Polygon(draft_piece(piece).cut_line).is_valid
+    assert shapely.Polygon(drafted_piece(piece).cut_line).is_valid

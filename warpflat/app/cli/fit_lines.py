@@ -11,6 +11,9 @@ from warpflat.pattern import RANGES, limit_words, pressure_words, strain_words
 
 __all__ = ["fit_lines"]
 
+# What is equal within this, in metres or as a share of a length, is told once.
+_ALIKE = 5e-4
+
 
 def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
     """Return what `-v` tells of the fit: a line per piece, one for each place and remedy where a piece is held beyond its limits."""
@@ -40,7 +43,7 @@ def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
     if lines:
         lines.append(f"ranges: {RANGES}, against the {against}")
     if wearer := metrics.get("wear", {}).get("wearer"):
-        lines += [wearer_words(wearer), *filter(None, [wearer_places(wearer)])]
+        lines += [wearer_words(wearer, metrics.get("girths", {})), *filter(None, [wearer_places(wearer)])]
     if verdict := metrics.get("verdict"):
         lines.append(verdict["words"])
         lines += [
@@ -49,14 +52,23 @@ def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def wearer_words(wearer: Mapping[str, Any]) -> str:
-    """Return how a garment lies on the body: strain and pressure where the cloth is smaller, and the ease where it is larger."""
+def wearer_words(wearer: Mapping[str, Any], girths: Mapping[str, Mapping[str, float]]) -> str:
+    """Return how a garment lies on the body: strain and pressure where the cloth is smaller, and the ease where it is larger.
+
+    Where a cuff or a band draws the cloth in, as the garment's `girths` tell, the ease is that of the band.
+    """
+    levels, found = dict(wearer["levels"]), dict[str, Mapping[str, Any]]()
+    for name in levels.keys() & girths.keys():
+        girth = girths[name]
+        if girth["ease_m"] < levels[name]["ease_m"] - _ALIKE:
+            strain = max(0.0, girth["body_m"] / girth["pattern_m"] - 1.0)
+            # How hard it presses is not known: a band may be of another cloth.
+            levels[name] = {"ease_m": girth["ease_m"], "strain": strain, "sides": {}}
     # Levels of a left and a right limb are one where they are equal within 0.5 mm and 0.05 %.
-    levels, found = wearer["levels"], dict[str, Mapping[str, Any]]()
     for name, level in levels.items():
         both, _, side = name.rpartition(" ")
         other = levels.get(f"{both} {'left' if side == 'right' else 'right'}")
-        same = other is not None and all(abs(level[key] - other[key]) < 5e-4 for key in ("ease_m", "strain"))
+        same = other is not None and all(abs(level[key] - other[key]) < _ALIKE for key in ("ease_m", "strain"))
         found[both if same else name] = level
     tight, loose = [], []
     for name, level in found.items():
@@ -64,8 +76,9 @@ def wearer_words(wearer: Mapping[str, Any]) -> str:
         if level["strain"] == 0.0:
             loose.append(ease)
             continue
-        pressure = max(side["pressure_pa"] for side in level["sides"].values())
-        tight.append(f"{ease} ({100 * level['strain']:.1f} %, {pressure:,.0f} Pa)")
+        pressures = [side["pressure_pa"] for side in level["sides"].values()]
+        pressure = f", {max(pressures):,.0f} Pa" if pressures else ""
+        tight.append(f"{ease} ({100 * level['strain']:.1f} %{pressure})")
     words = "; ".join(f"{word} at {', '.join(row)}" for word, row in (("stretched", tight), ("ease", loose)) if row)
     return f"wearer: {words}"
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from warpflat.app.cli.tables import cut_words
 from warpflat.app.review.figures import count_pieces
-from warpflat.core import energy_words, format_count
+from warpflat.core import energy_words, format_count, list_some
 from warpflat.garment import LACKING, NO_PATTERN
 
 __all__ = ["notes_line", "summary_lines"]
@@ -37,8 +37,7 @@ def summary_lines(
     pieces, verdict, lines = metrics["pieces"], metrics.get("verdict"), list[str]()
     unfinished = [name for name, piece in pieces.items() if not piece["stages"][-1]["converged"]]
     flips = sum(piece["flipped_faces"] for piece in pieces.values())
-    beyond = f" and {len(unfinished) - 3} more" if len(unfinished) > 3 else ""
-    wrong = [f"NOT at rest: {', '.join(unfinished[:3])}{beyond}"] if unfinished else []
+    wrong = [f"NOT at rest: {list_some(unfinished, 3)}"] if unfinished else []
     wrong += [format_count(flips, "flipped face")] if flips else []
     findings = verdict["findings"] if verdict else []
     failing, told = ([each for each in findings if each["fails"] is fails] for fails in (True, False))
@@ -54,9 +53,10 @@ def summary_lines(
     if taken := metrics.get("pattern_of_file"):
         others.insert(0, cut_words(taken))
     if correction := metrics.get("drape", {}).get("correction"):
-        first, *_, last = (1e3 * each["misfit_m"] for each in correction["rounds"])
-        rounds = format_count(len(correction["rounds"]) - 1, "round")
-        others.insert(0, f"corrected: misfit {first:.2f} to {last:.2f} mm in {rounds}; {correction['reason']}")
+        misfits = [1e3 * each["misfit_m"] for each in correction["rounds"]]
+        rounds = format_count(len(misfits) - 1, "round")
+        change = f"misfit {misfits[0]:.2f} to {misfits[-1]:.2f} mm in {rounds}"
+        others.insert(0, f"corrected: {change}; {correction['reason']}")
     if failing and failing[0]["remedy"]:
         # One piece of a mesh for which no seams were looked for.
         alone = size and len(pieces) == 1 and "garment" not in metrics
@@ -88,6 +88,7 @@ def summary_lines(
         if line
     ]
     # As many names as fit into a line, at least one, and how many more there are.
+    listed = f"{shlex.quote(folder)}: no files"
     for shown in range(len(ordered), 0, -1):
         more = "" if shown == len(ordered) else f", {len(ordered) - shown} more"
         listed = f"{shlex.quote(folder)}: {', '.join(ordered[:shown])}{more}"

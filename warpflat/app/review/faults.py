@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from warpflat.core import energy_words, format_count
+from warpflat.core import energy_words, format_count, list_some
 
 __all__ = ["faults_of", "is_done"]
 
@@ -73,13 +73,12 @@ def faults_of(metrics: Mapping[str, Any]) -> list[str]:
         )
     pattern = metrics.get("pattern", {})
     if differing := pattern.get("seams_that_differ"):
-        names = ", ".join(differing[:3]) + (f" and {len(differing) - 3} more" if len(differing) > 3 else "")
         near = pattern["seam_difference_per_50mm_mm"]
         over = "" if near is None else f" as a whole, and {near:.2f} mm over 50 mm"
         lines.insert(
             0,
             f"the drawn sides of {format_count(len(differing), 'seam')} differ by up to {pattern['seam_difference_mm']:.2f} mm{over}: "
-            f"{names}; one side must be eased to the other there",
+            f"{list_some(differing, 3)}; one side must be eased to the other there",
         )
     if refused := metrics.get("garment", {}).get("no_pattern"):
         lines.insert(0, refused)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from warpflat.app.scene.comparison import Comparison
+from warpflat.app.scene.comparison import Comparison, outline
 from warpflat.app.scene.drape import drape_scene
 from warpflat.app.scene.form_shaping import require_open_darts, settle_shape, with_open_darts
 from warpflat.app.scene.load import Scene, scene_fabric
@@ -104,16 +104,25 @@ def save_comparison(comparison: Comparison, folder: str | Path) -> tuple[list[st
     Raises:
         InputError: the folder cannot be written, or a surface was read from a file there that would be replaced.
     """
-    from warpflat.app.scene.compare_picture import write_overlay_picture, write_overlay_svg
+    from warpflat.app.scene.compare_picture import overlay_style, write_overlay_picture
     from warpflat.core import optional_file, output_folder, remove_stale
     from warpflat.garment import write_compared_drapes
+    from warpflat.pattern import write_overlay_svg
 
     sources = [
         file for pieces in comparison.results.values() for piece in pieces.values() for file in piece.surface.sources
     ]
     files = ["compare.svg"]
     with output_folder(folder, compared_files(drape=bool(comparison.drapes)), sources=sources, guard=True) as to:
-        write_overlay_svg(to / "compare.svg", comparison)
+        outlines = {
+            piece: {
+                fabric: outline(results[piece], comparison.layouts[fabric][piece])
+                for fabric, results in comparison.results.items()
+            }
+            for piece in comparison.pieces
+        }
+        styles = {fabric: overlay_style(number) for number, fabric in enumerate(comparison.fabrics)}
+        write_overlay_svg(to / "compare.svg", outlines, styles)
         with optional_file(to / "compare.png", files) as path:
             write_overlay_picture(path, comparison)
         if comparison.drapes:

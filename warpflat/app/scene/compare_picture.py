@@ -1,21 +1,19 @@
-"""Outlines of one pattern in several fabrics, laid upon each other: a picture with close-ups, and a true-size SVG."""
+"""Outlines of one pattern in several fabrics, laid upon each other: a picture with close-ups."""
 
 from __future__ import annotations
 
 import os
 from textwrap import fill
-from xml.etree import ElementTree as ET
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from warpflat.app.scene.comparison import Comparison, outline
-from warpflat.core import atomic_path
 from warpflat.flat import border_of
 from warpflat.pattern import all_letters, new_figure, write_figure
 
-__all__ = ["write_overlay_picture", "write_overlay_svg"]
+__all__ = ["overlay_style", "write_overlay_picture"]
 
 
 # Okabe and Ito's colours, which can be distinguished without red-green vision; and dashes, for print in grey.
@@ -29,54 +27,11 @@ _STYLES: tuple[tuple[str, tuple[float, ...]], ...] = (
     ("#56b4e9", (10, 3)),
 )
 _CLOSE_UPS = 3
-_MARGIN_MM = 15.0
 
 
-def _style(number: int) -> tuple[str, tuple[float, ...]]:
+def overlay_style(number: int) -> tuple[str, tuple[float, ...]]:
+    """Return the colour and the dashes of a fabric's lines, by its number."""
     return _STYLES[number % len(_STYLES)]
-
-
-def _stroke(number: int) -> dict[str, str]:
-    """Return the colour and the dashes of a fabric's lines in SVG."""
-    colour, dashes = _style(number)
-    return {"stroke": colour} | ({"stroke-dasharray": " ".join(f"{d:g}" for d in dashes)} if dashes else {})
-
-
-def write_overlay_svg(path: str | os.PathLike[str], comparison: Comparison) -> None:
-    """Write the outlines in true size (a unit is a millimetre), in a group per piece with a path per fabric.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    root = ET.Element("svg", {"xmlns": "http://www.w3.org/2000/svg"})
-    left, height = _MARGIN_MM, 0.0
-    legend = _MARGIN_MM + 6.0 * len(comparison.fabrics)
-    for piece in comparison.pieces:
-        points = np.concatenate([comparison.layouts[fabric][piece] for fabric in comparison.fabrics])
-        low, high = 1e3 * points.min(axis=0), 1e3 * points.max(axis=0)
-        group = ET.SubElement(root, "g", {"id": piece.replace(" ", "_"), "fill": "none", "stroke-width": "0.4"})
-        for number, fabric in enumerate(comparison.fabrics):
-            parts = []
-            for loop in outline(comparison.results[fabric][piece], comparison.layouts[fabric][piece]):
-                x = 1e3 * loop[:-1, 0] - low[0] + left
-                y = high[1] - 1e3 * loop[:-1, 1] + legend + _MARGIN_MM
-                parts.append("M" + " L".join(f"{a:.3f},{b:.3f}" for a, b in zip(x, y, strict=True)) + " Z")
-            attributes = {"id": f"{piece}.{fabric}".replace(" ", "_"), "d": " ".join(parts)}
-            ET.SubElement(group, "path", attributes | _stroke(number))
-        left += float(high[0] - low[0]) + _MARGIN_MM
-        height = max(height, float(high[1] - low[1]))
-    for number, fabric in enumerate(comparison.fabrics):
-        y = _MARGIN_MM + 6.0 * number
-        line = {"x1": f"{_MARGIN_MM}", "x2": f"{_MARGIN_MM + 20}", "y1": f"{y}", "y2": f"{y}", "stroke-width": "0.6"}
-        ET.SubElement(root, "line", line | _stroke(number))
-        text = ET.SubElement(root, "text", {"x": f"{_MARGIN_MM + 23}", "y": f"{y + 1.5}", "font-size": "4.5"})
-        text.text = fabric
-    tall = legend + height + 2 * _MARGIN_MM
-    root.set("width", f"{left:.3f}mm")
-    root.set("height", f"{tall:.3f}mm")
-    root.set("viewBox", f"0 0 {left:.3f} {tall:.3f}")
-    with atomic_path(path) as temporary:
-        ET.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
 
 
 @all_letters()
@@ -124,7 +79,7 @@ def write_overlay_picture(path: str | os.PathLike[str], comparison: Comparison) 
         length = 0.1 if whole.get_xlim()[1] - low > 0.25 else 0.02
         _draw_length(whole, low, high, length, f"{100 * length:.0f} cm")
     handles = []
-    for colour, dashes in map(_style, range(len(comparison.fabrics))):
+    for colour, dashes in map(overlay_style, range(len(comparison.fabrics))):
         handles.append(Line2D([], [], color=colour, linestyle=(0, dashes), linewidth=1.6))
     figure.legend(
         handles,
@@ -144,7 +99,7 @@ def _draw_length(axis: Axes, x: float, y: float, length: float, words: str) -> N
 
 def _draw_outlines(axis: Axes, comparison: Comparison, piece: str, *, width: float) -> None:
     for number, fabric in enumerate(comparison.fabrics):
-        colour, dashes = _style(number)
+        colour, dashes = overlay_style(number)
         for loop in outline(comparison.results[fabric][piece], comparison.layouts[fabric][piece]):
             axis.plot(*loop.T, color=colour, linewidth=width, linestyle=(0, dashes))
     axis.set_aspect("equal")

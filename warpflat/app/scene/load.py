@@ -135,21 +135,26 @@ def scene_fabric(scene: Scene) -> Fabric:
     else:
         with errors_named(f"{scene.where}: fabric"):
             fabric = find_fabric(settings.fabric, library)
+    return _as_allowed(scene, fabric)
+
+
+def _as_allowed(scene: Scene, fabric: Fabric) -> Fabric:
     with errors_named(f"{scene.where}: shear_limit"):
-        return fabric.allowing(settings.shear_limit)
+        return fabric.allowing(scene.settings.shear_limit)
 
 
 def fabric_of_correction(scene: Scene) -> Fabric | None:
-    """Return the other cloth of the scene's corrected pattern; None if the scene names none.
+    """Return the other cloth of the scene's corrected pattern, with the limit of shear that the scene allows; None if it names none.
 
     Raises:
-        InputError: an unknown name (names the nearest).
+        InputError: an unknown name (names the nearest), or a limit of shear for an isotropic sheet.
     """
     table = scene.settings.drape
     if table is None or table.correct_fabric is None:
         return None
     with errors_named(f"{scene.where}: drape.correct_fabric"):
-        return find_fabric(table.correct_fabric, scene_library(scene))
+        fabric = find_fabric(table.correct_fabric, scene_library(scene))
+    return _as_allowed(scene, fabric)
 
 
 def scene_wear(scene: Scene) -> Wear | None:

@@ -272,6 +272,7 @@ class Session:
                 datum=flat.datum,
                 grain_angle=flat.grain_angle,
                 model=settings.model,
+                wear=flat.wear,
                 relax=flat.options,
                 energy_every=20,
             )

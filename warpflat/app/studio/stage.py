@@ -218,12 +218,6 @@ class Stage:
         for name, (piece, place) in handles.items():
             self._handles[name].position = (*(place + self._corners[piece]).tolist(), _ABOVE)
 
-    def handle_position(self, name: str) -> FloatArray | None:
-        """Return where a point that can be dragged is seen, 3 [m]; None if there is none of that name."""
-        if name not in self._handles:
-            return None
-        return np.asarray(self._pattern.position) + self._turn @ np.asarray(self._handles[name].position)
-
     def on_table(self, piece: str, point: Sequence[float]) -> FloatArray:
         """Return where a point of the scene lies in a piece's pattern, 2 [m]."""
         local = (np.asarray(point, dtype=float) - np.asarray(self._pattern.position)) @ self._turn

@@ -16,6 +16,7 @@ from warpflat.flat.flattening.flatten_piece import check_settings, check_surface
 from warpflat.flat.model.membrane import ModelChoice
 from warpflat.flat.model.network import SpringNetwork
 from warpflat.flat.model.strain import worn_strain
+from warpflat.flat.model.wear import Wear
 from warpflat.flat.solver.grain import GrainAlignment, remove_rotation
 from warpflat.flat.solver.options import RelaxOptions
 from warpflat.flat.solver.steps import Relaxation
@@ -60,6 +61,7 @@ def relaxation(
     datum: str | ArrayLike | None = None,
     grain_angle: float = 0.0,
     model: ModelChoice = "auto",
+    wear: Wear | None = None,
     relax: RelaxOptions | None = None,
     device: str | None = None,
     energy_every: int = 1,
@@ -70,7 +72,7 @@ def relaxation(
     L-BFGS, repeated measuring of directions and contact are left to :func:`warpflat.flatten`, which is faster.
 
     Args:
-        surface, fabric, datum, grain_angle, model, relax, device: as `flatten` takes them.
+        surface, fabric, datum, grain_angle, model, wear, relax, device: as `flatten` takes them.
         energy_every: energies are measured every so many steps, and convergence with them.
         force: a force of one's own beside those of the cloth: takes the layout, #V by 2 [m], before each step, and gives #V by 2 [N]. What
             of it only turns the piece is left out, since the grain is kept upright. Energies are those of the cloth alone; at rest is where
@@ -82,7 +84,7 @@ def relaxation(
     """
     if not isinstance(energy_every, int) or isinstance(energy_every, bool) or energy_every < 1:
         raise InputError(f"energy_every = {energy_every!r} must be a whole number, at least 1")
-    settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=None, relax=relax, device=device)
+    settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=wear, relax=relax, device=device)
     check_surface(surface)
     piece = develop_piece(surface, datum, settings, None)
     return _steps(piece.network, piece.development.positions, settings.options, piece.task.datum, energy_every, force)

@@ -23,6 +23,7 @@ from warpflat.garment.construction.constraint_equations import (
     straight_equations,
 )
 from warpflat.garment.construction.mirror import mirror_partners
+from warpflat.garment.mannequin.layout import ARM_LEVELS
 
 if TYPE_CHECKING:
     from warpflat.flat import Flattening
@@ -42,10 +43,6 @@ __all__ = [
     "straight_hems",
     "straight_stands",
 ]
-
-# The arm's levels at which sleeves end. An upper arm tapers, and an elbow that is bent makes the cloth below it as long as it is bent,
-# by column.
-_SLEEVE_HEMS = ("biceps", "elbow", "forearm", "wrist")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -268,7 +265,8 @@ def find_piece(constraint: PieceConstraint, pieces: Mapping[str, Flattening]) ->
 def straight_hems(form: FormResult, asked: Sequence[Constraint]) -> list[Straight]:
     """Return the hems of sleeves as straight lines; the cap, or fullness at the elbow, takes up what they would curve by.
 
-    A hem lies along the weft, or square to the forearm where an elbow dart swings it.
+    An upper arm tapers, and an elbow that is bent makes the cloth below it as long as it is bent, by column. A hem lies along the weft,
+    or square to the forearm where an elbow dart swings it.
 
     Args:
         form: the garment.
@@ -280,7 +278,7 @@ def straight_hems(form: FormResult, asked: Sequence[Constraint]) -> list[Straigh
         Straight(piece=name, line=edge, along="free" if piece.darts else "weft")
         for name, piece in form.pieces.items()
         for edge in piece.edges
-        if edge.split(" ")[0] in _SLEEVE_HEMS and (name, edge) not in settled and edge not in piece.leg_edges
+        if edge.split(" ")[0] in ARM_LEVELS[1:] and (name, edge) not in settled and edge not in piece.leg_edges
     ]
 
 

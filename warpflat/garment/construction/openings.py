@@ -24,7 +24,7 @@ from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.forms import Form, PieceRecipe
 from warpflat.garment.mannequin.halves import is_side
 from warpflat.garment.mannequin.layout import RING_LEVELS
-from warpflat.garment.mannequin.part_pieces import part_recipe
+from warpflat.garment.mannequin.part_pieces import part_labels, part_recipe
 from warpflat.pattern import EdgeRules
 
 if TYPE_CHECKING:
@@ -67,19 +67,26 @@ class OpeningPart:
 
 
 def part_at_centres(layout: Layout, form: Form, openings: Sequence[OpeningTable]) -> Form:
-    """Return a form whose pieces are parted along the centre lines that have openings; a piece "back" becomes two."""
+    """Return a form whose pieces are parted along the centre lines that have openings; a piece "back" becomes two.
+
+    One that goes all around, so that its halves are joined elsewhere, is opened along the line and stays one; where it buttons or
+    wraps, each half runs beyond the line, and it becomes two.
+    """
     pieces = dict(form.pieces)
+    overlapping = {opening.seam for opening in openings if opening.kind in ("buttons", "wrap")}
     for line in dict.fromkeys(opening.seam for opening in openings if opening.seam in CENTRES and opening.parts_pieces):
         parted: dict[str, PieceRecipe] = {}
         for name, recipe in pieces.items():
             bricks = select_bricks(layout, recipe.bricks)
             sides = {side: [b for b in bricks if is_side(b, side)] for side in ("left", "right")}
             on_line = np.isin(layout.faces[layout.faces_of(bricks)], layout.lines[line]).sum() > 1
-            if all(sides.values()) and on_line and line not in recipe.open:
+            if not (all(sides.values()) and on_line) or line in recipe.open:
+                parted[name] = recipe
+            elif line in overlapping or len(set(part_labels(layout, bricks, [line, *recipe.open]).tolist())) > 1:
                 for side, half in sides.items():
                     parted[f"{name}_{side}"] = part_recipe(layout, recipe, half, [line])
             else:
-                parted[name] = recipe
+                parted[name] = replace(recipe, open=(*recipe.open, line))
         pieces = parted
     return replace(form, pieces=pieces)
 

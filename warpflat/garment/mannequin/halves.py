@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-from warpflat.core import InputError
+from warpflat.core import InputError, list_some
 
 __all__ = ["check_halves", "fold_among", "is_side", "lies_on_both"]
 
@@ -43,7 +43,7 @@ def check_halves(pieces: Mapping[str, Cut]) -> None:
             if image != set(bricks):
                 lone = [b for b in bricks if b not in image]
                 raise InputError(
-                    f"form: half = true mirrors the left half, but in piece {name} {_listed(lone)} "
+                    f"form: half = true mirrors the left half, but in piece {name} {list_some(lone, _LISTED)} "
                     f"{'has' if len(lone) == 1 else 'have'} no mirror image; {_WHOLE}"
                 )
             partner = name
@@ -52,7 +52,8 @@ def check_halves(pieces: Mapping[str, Cut]) -> None:
             if found is None:
                 lone = [b for b in bricks if _mirrored(b) not in used] or list(bricks)
                 raise InputError(
-                    f"form: half = true mirrors the left half, but no piece is the mirror image of piece {name} ({_listed(lone)}); {_WHOLE}"
+                    f"form: half = true mirrors the left half, but no piece is the mirror image of piece {name} "
+                    f"({list_some(lone, _LISTED)}); {_WHOLE}"
                 )
             partner = found
         _, their_datum, theirs = pieces[partner]
@@ -96,8 +97,3 @@ def fold_among(edges: Iterable[str], opened: Sequence[str], name: str) -> str:
 def _mirrored(name: str) -> str:
     """Return the name of a brick or line on the other side of the body; that of one on the midplane stays."""
     return re.sub(r"\b(left|right)\b", lambda side: "right" if side[0] == "left" else "left", name)
-
-
-def _listed(bricks: Sequence[str]) -> str:
-    more = len(bricks) - _LISTED
-    return ", ".join(bricks[:_LISTED]) + (f" and {more} more" if more > 0 else "")

@@ -15,7 +15,7 @@ from warpflat.garment.mannequin.forms import Form, PieceRecipe
 from warpflat.garment.mannequin.halves import is_side
 from warpflat.garment.mannequin.layout import Layout
 
-__all__ = ["part_pieces", "part_recipe", "princess_seams", "taken_over"]
+__all__ = ["part_labels", "part_pieces", "part_recipe", "princess_seams", "taken_over"]
 
 
 def part_pieces(layout: Layout, vertices: FloatArray, form: Form, seams: Sequence[FormDart]) -> Form:
@@ -47,7 +47,7 @@ def part_pieces(layout: Layout, vertices: FloatArray, form: Form, seams: Sequenc
             pieces[name] = recipe
             continue
         chosen = select_bricks(layout, recipe.bricks)
-        label = _labels(layout, chosen, lines[name])
+        label = part_labels(layout, chosen, lines[name])
         if len(set(label.tolist())) == 1:
             raise InputError(
                 f"{' and '.join(repr(line) for line in lines[name])} do not part piece {name!r}; name lines that cross it"
@@ -119,7 +119,7 @@ def princess_seams(layout: Layout, bricks: Sequence[str], piece: str) -> list[Fo
     return [
         FormDart(name="princess seam", piece=piece, line=line, part=(0.0, 1.0))
         for line in lines
-        if len(set(_labels(layout, bricks, [line, other_side(line)]).tolist())) > 1
+        if len(set(part_labels(layout, bricks, [line, other_side(line)]).tolist())) > 1
     ]
 
 
@@ -131,7 +131,7 @@ def part_recipe(layout: Layout, recipe: PieceRecipe, bricks: Sequence[str], line
     return PieceRecipe(bricks=tuple(bricks), datum=(through or [""])[0], open=opened)
 
 
-def _labels(layout: Layout, bricks: Sequence[str], lines: Sequence[str]) -> IntArray:
+def part_labels(layout: Layout, bricks: Sequence[str], lines: Sequence[str]) -> IntArray:
     """Return for each brick the number of the part to which it belongs: neighbours are one part unless a line lies between."""
     slits = layout.edges_along(*lines)
     edges = [layout.edges_of([brick]) - slits for brick in bricks]

@@ -46,7 +46,7 @@ from warpflat.pattern.drafting.sides import Side, Wedge
 from warpflat.pattern.drafting.truing import CornerReport, true_corners
 from warpflat.pattern.drafting.words import printed_in
 
-__all__ = ["draft_garment", "draft_half", "draft_piece", "nest_label", "relabelled"]
+__all__ = ["draft_garment", "draft_half", "nest_label", "relabelled"]
 
 
 #: A grain line may lie beyond the sewing line by this much [m], as along a fold.
@@ -109,11 +109,6 @@ def draft_garment(
             )
             reports += seam_reports(seams, {piece.name: piece for piece in drafted[size]}, size)
         return DraftedGarment(garment=garment, pieces=drafted, seams=tuple(reports), corners=tuple(corners))
-
-
-def draft_piece(piece: Piece, *, garment: str = "", tolerance: float | None = None) -> DraftedPiece:
-    """Draft one piece on its own, without the notches and the trued corners that its seams would give it."""
-    return _draft(piece, garment, _fitted_edges([piece], (), tolerance, true=False)[0][piece.name], tolerance)
 
 
 def draft_half(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import polyline_length
+from warpflat.core import polyline_length, turn_between
 from warpflat.pattern.drafting.polygons import (
     cut_off,
     difference,
@@ -15,7 +15,6 @@ from warpflat.pattern.drafting.polygons import (
     normal_towards,
     parallelogram,
     reflect,
-    turn_between,
     union,
 )
 from warpflat.pattern.drafting.sides import MITRE_REACH, Side, Wedge

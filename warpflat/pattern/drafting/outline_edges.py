@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core import FARTHEST, FloatArray, InputError, polyline_length, unit
+from warpflat.core import FARTHEST, FloatArray, InputError, polyline_length, turn_between, unit
 from warpflat.pattern.drafting.corners import find_corners
 from warpflat.pattern.drafting.curves import CHORD
 from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT, MOST_ALLOWANCE, Dart, Edge
-from warpflat.pattern.drafting.polygons import half_plane, mirror_image, signed_area, turn_between
+from warpflat.pattern.drafting.polygons import half_plane, mirror_image, signed_area
 
 __all__ = ["boundary_edges", "inset", "named_outline", "split_outline", "with_drawn_allowances"]
 

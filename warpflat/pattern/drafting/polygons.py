@@ -30,7 +30,6 @@ __all__ = [
     "reflect",
     "rotation",
     "signed_area",
-    "turn_between",
     "union",
     "upright",
 ]
@@ -154,11 +153,6 @@ def normal_towards(direction: FloatArray, other: FloatArray) -> FloatArray:
 def angle_between(a: FloatArray, b: FloatArray) -> float:
     """Return the angle [rad] between two unit vectors."""
     return float(np.arccos(np.clip(a @ b, -1.0, 1.0)))
-
-
-def turn_between(a: FloatArray, b: FloatArray) -> float:
-    """Return the angle [rad] by which a vector turns to another one, to the left positive."""
-    return float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
 
 
 def rotation(angle: float) -> FloatArray:

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core import other_side, unnumbered, without_side
+from warpflat.core import other_side, turn_between, unnumbered, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.pieces import Seam, SeamOpening, SeamSide
-from warpflat.pattern.drafting.polygons import signed_area, turn_between
+from warpflat.pattern.drafting.polygons import signed_area
 from warpflat.pattern.drafting.seam_words import joint_words
 from warpflat.pattern.drafting.sewing_tasks import GATHERED, Place, SewingTasks, Task, pieces_of, techniques
 from warpflat.pattern.drafting.words import letters_of, translate, translate_name
@@ -49,6 +49,7 @@ class SewingStep:
     Attributes:
         words: one sentence or more.
         technique: how it is sewn, one of :func:`techniques`.
+        seams: that are sewn, in their order.
         sewn: of each piece that is at work, by its name, the edges that are sewn; fisheye darts among them.
         finished: free and folded edges that it uses up: hemmed, faced, bound, turned in.
         notions: what it takes beside the cloth.
@@ -56,6 +57,7 @@ class SewingStep:
 
     words: str
     technique: str
+    seams: tuple[SewnSeam, ...]
     sewn: Mapping[str, frozenset[str]]
     finished: frozenset[Place] = frozenset()
     notions: tuple[str, ...] = ()
@@ -112,11 +114,6 @@ class SewnSeam:
         return f"{self.letter} ({words})"
 
 
-def sewn_seams(garment: DraftedGarment, size: str) -> tuple[SewnSeam, ...]:
-    """Return the seams of a garment in their order, each with its letter."""
-    return tuple(each for batch in _Workshop(garment, size).batches for task in batch for each in task[1])
-
-
 def seam_letters(garment: DraftedGarment) -> dict[str, str]:
     """Return the letter of each seam by its name, in the order of the sample size."""
     workshop = _Workshop(garment, garment.sample)
@@ -131,7 +128,8 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
     for technique, batch in zip(workshop.techniques, workshop.batches, strict=True):
         tasks = [task for task, _ in batch]
         sewn: dict[str, set[str]] = {piece: set() for task in tasks for piece in task.pieces}
-        places = [place for _, seams in batch for seam in seams for place in seam.places]
+        seams = tuple(seam for _, row in batch for seam in row)
+        places = [place for seam in seams for place in seam.places]
         for piece, edge in (*places, *(place for task in tasks for place in (*task.places, *task.uses))):
             sewn.setdefault(piece, set()).add(edge)
         # A lining covers the edges of facings that are sewn to it.
@@ -144,7 +142,7 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
         for task in tasks:
             values |= task.values
         values |= {
-            "seams": ", ".join(seam.words() for _, row in batch for seam in row) or values.get("seams", ""),
+            "seams": ", ".join(seam.words() for seam in seams) or values.get("seams", ""),
             "pieces": workshop.called(
                 [piece for task in tasks for piece in (task.pieces or pieces_of([*task.uses, *task.places]))]
             ),
@@ -158,12 +156,18 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[SewingStep, ...]:
             SewingStep(
                 words=" ".join(translate(techniques()[technique]["text"], **values).split()),
                 technique=technique,
+                seams=seams,
                 sewn={piece: frozenset(edges) for piece, edges in sewn.items()},
                 finished=frozenset(place for task in tasks for place in task.uses),
                 notions=tuple(each for task in tasks for each in task.notions),
             )
         )
     return tuple(steps)
+
+
+def sewn_seams(steps: Sequence[SewingStep]) -> tuple[SewnSeam, ...]:
+    """Return the seams of a garment in their order, each with its letter."""
+    return tuple(seam for step in steps for seam in step.seams)
 
 
 def notions(steps: Sequence[SewingStep]) -> tuple[str, ...]:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, unit
-from warpflat.pattern.drafting.polygons import GRID, difference, turn_between, union
+from warpflat.core import FloatArray, turn_between, unit
+from warpflat.pattern.drafting.polygons import GRID, difference, union
 
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core import FloatArray, arc_lengths, unit
+from warpflat.core import FloatArray, arc_lengths, turn_between, unit
 from warpflat.pattern.drafting.curves import Curve, cubic_weights, split_bezier
 from warpflat.pattern.drafting.fitting import EdgeKey
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
-from warpflat.pattern.drafting.polygons import turn_between
 
 __all__ = ["CornerReport", "true_corners", "turned_end"]
 

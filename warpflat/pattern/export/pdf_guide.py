@@ -170,7 +170,7 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
         )
     for number, sewing in enumerate(steps, 1):
         _step(page, number, sewing, [(p, sewing.sewn[p.name]) for p in whole.pieces[size] if p.name in sewing.sewn])
-    if seams := sewn_seams(whole, size):
+    if seams := sewn_seams(steps):
         page.heading(translate("Seams") + (f", {printed_size(size)}" if len(whole.pieces) > 1 else ""), 3 * LINE)
         rows = []
         for seam in seams:

@@ -19,7 +19,7 @@ from warpflat.pattern.drafting.polygons import mapped
 from warpflat.pattern.drafting.seam_words import seam_words
 from warpflat.pattern.drafting.words import printed_in
 
-__all__ = ["OF_SIZE", "SIZE_COLOURS", "STYLE", "SvgPage", "write_marker_svg", "write_svg"]
+__all__ = ["OF_SIZE", "SIZE_COLOURS", "STYLE", "SvgPage", "write_marker_svg", "write_overlay_svg", "write_svg"]
 
 
 #: Stroke colour, width [mm], dashes [mm] by role; shared with the PDF.
@@ -96,6 +96,57 @@ def write_marker_svg(marker: Marker, path: str | os.PathLike[str]) -> None:
     page.write(path)
 
 
+def write_overlay_svg(
+    path: str | os.PathLike[str],
+    outlines: Mapping[str, Mapping[str, Sequence[FloatArray]]],
+    styles: Mapping[str, tuple[str, Sequence[float]]],
+) -> None:
+    """Write pieces in several versions upon each other, in true size, side by side, with what each line stands for above.
+
+    A group is called as its piece, and the lines in it "PIECE.VERSION".
+
+    Args:
+        path: of the file.
+        outlines: of each piece in each version, #P by 2 [m], the last point as the first.
+        styles: of each version the colour and the dashes [mm].
+    """
+    margin, row = 0.015, 0.006
+    corners = {
+        piece: np.concatenate([loop for loops in versions.values() for loop in loops])
+        for piece, versions in outlines.items()
+    }
+    extents = [np.ptp(points, axis=0) for points in corners.values()]
+    top = 2 * margin + row * len(styles)
+    page = SvgPage(
+        margin + sum(float(extent[0]) + margin for extent in extents),
+        top + max(float(extent[1]) for extent in extents) + margin,
+        ", ".join(styles),
+    )
+    high = 1e-3 * page.height
+
+    def draw(parent: ET.Element, version: str, points: FloatArray, width: float, *, closed: bool) -> None:
+        colour, dashes = styles[version]
+        page.stroke(parent, Stroke(role="cut", name="", points=points, closed=closed), "")
+        dashed = f"; stroke-dasharray: {' '.join(f'{dash:g}' for dash in dashes)}" if dashes else ""
+        parent[-1].set("style", f"stroke: {colour}; stroke-width: {width:g}{dashed}")
+
+    left = margin
+    for (piece, versions), extent in zip(outlines.items(), extents, strict=True):
+        shift = [left - corners[piece][:, 0].min(), high - top - corners[piece][:, 1].max()]
+        group = ET.SubElement(page.root, "g", {"id": page.unique_id(piece)})
+        for version, loops in versions.items():
+            for loop in loops:
+                draw(group, version, loop[:-1] + shift, 0.4, closed=True)
+                group[-1].set("id", page.unique_id(f"{piece}.{version}"))
+        left += float(extent[0]) + margin
+    for number, version in enumerate(styles):
+        y, height = high - margin - row * number, 0.0045 * CAPITALS
+        draw(page.root, version, np.array([[margin, y], [margin + 0.02, y]]), 0.6, closed=False)
+        at = np.array([margin + 0.023 + 0.5 * text_width(version, height), y])
+        page.words(page.root, Words(text=version, at=at, height=height))
+    page.write(path)
+
+
 class SvgPage:
     """One SVG document whose user unit is the millimetre; y runs downwards in it, so heights are turned over."""
 
@@ -134,7 +185,7 @@ class SvgPage:
     ) -> None:
         """Add a group for one piece and size, moved by a 2 by 3 matrix [m]; `seams` are the words at its edges."""
         piece = drawing.piece
-        key = self._id(f"{piece.name}-{piece.size}" if piece.size else piece.name)
+        key = self.unique_id(f"{piece.name}-{piece.size}" if piece.size else piece.name)
         about = {
             "data-piece": piece.name,
             "data-size": piece.size,
@@ -159,7 +210,7 @@ class SvgPage:
         matrix = np.eye(2, 3) if matrix is None else matrix
         attributes = {"class": stroke.role}
         if stroke.name:
-            attributes["id"] = self._id(f"{key}.{stroke.name}")
+            attributes["id"] = self.unique_id(f"{key}.{stroke.name}")
             attributes["data-edge"] = stroke.name
         if colour is not None and stroke.role in OF_SIZE:
             attributes["style"] = f"stroke: {colour}"
@@ -205,7 +256,7 @@ class SvgPage:
 
     def marker_copy(self, copy: Copy, index: int) -> None:
         """Add one placed copy of a marker."""
-        key = self._id(f"copy{index}-{copy.label}")
+        key = self.unique_id(f"copy{index}-{copy.label}")
         group = ET.SubElement(self.root, "g", {"id": key, "data-piece": copy.piece.name, "data-size": copy.piece.size})
         ET.SubElement(group, "title").text = copy.label
         self.stroke(group, Stroke(role="cut", name="cut", points=copy.cut_line, closed=True), key)
@@ -235,7 +286,7 @@ class SvgPage:
         """Return points [m] in the millimetres of the page, y downwards."""
         return np.column_stack([points[:, 0] * 1000, self.height - points[:, 1] * 1000])
 
-    def _id(self, name: str) -> str:
+    def unique_id(self, name: str) -> str:
         """Return a valid id that no other element has."""
         clean = re.sub(r"[^\w.\-]", "_", name)
         clean = clean if re.match(r"[^\W\d]", clean) else f"_{clean}"

@@ -14,7 +14,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths
-from warpflat.core.vectors import unit
+from warpflat.core.vectors import turn_between, unit
 from warpflat.flat.surface.cut.dart_legs import check_tip_back
 from warpflat.flat.surface.overlap import OVERLAP, overlap_width, overlapping
 
@@ -132,7 +132,7 @@ def dart_measure(positions: FloatArray, left: IntArray, right: IntArray) -> Dart
     legs = float(np.linalg.norm(to_left)), float(np.linalg.norm(to_right))
     if min(legs) <= 0:
         raise InputError(f"the dart at vertex {int(a[-1])} has a leg of no length")
-    angle = _angle(to_left, to_right)
+    angle = turn_between(to_left, to_right)
     return DartMeasure(
         opening=float(np.linalg.norm(to_left - to_right)),
         angle=angle,
@@ -210,7 +210,7 @@ def shape_dart(
         left_end=left_end,
         right_end=right_end,
         leg_length=leg,
-        angle=_angle(left_end - tip, right_end - tip),
+        angle=turn_between(left_end - tip, right_end - tip),
         intake=float(np.linalg.norm(left_end - right_end)),
         fold_point=tip + fold_length * fold,
     )
@@ -245,8 +245,8 @@ def fish_eye_measure(positions: FloatArray, left: IntArray, right: IntArray) -> 
         intake=float(np.copysign(gap[station], along[0] * across[1] - along[1] * across[0])),
         overlap=overlap_width(np.concatenate([x[b[:-1]], x[a[:0:-1]]])),
         station=station,
-        first_angle=_angle(wide[1] - x[a[0]], wide[0] - x[a[0]]),
-        last_angle=_angle(wide[0] - x[a[-1]], wide[1] - x[a[-1]]),
+        first_angle=turn_between(wide[1] - x[a[0]], wide[0] - x[a[0]]),
+        last_angle=turn_between(wide[0] - x[a[-1]], wide[1] - x[a[-1]]),
     )
 
 
@@ -296,8 +296,3 @@ def mouth_first(left: IntArray, right: IntArray) -> tuple[IntArray, IntArray]:
     if not (starts or ends):
         raise InputError(f"the cut from vertex {int(left[0])} to {int(left[-1])} has no tip: it parts the cloth")
     return (right[::-1], left[::-1]) if starts else (left, right)
-
-
-def _angle(u: FloatArray, v: FloatArray) -> float:
-    """Return the angle from u to v [rad], counter-clockwise positive."""
-    return float(np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
-from warpflat.core.text import quote_value
+from warpflat.core.text import list_some, quote_value
 from warpflat.core.usd_layers import check_layers
 from warpflat.core.usd_process import UNREADABLE
 from warpflat.flat.surface.io.raw_mesh import ALL_PRIMS, RawMesh, numbered, objects_in_turn
@@ -87,8 +87,7 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> tuple[
     if not chosen:
         raise InputError("holds no mesh prim")
     if prim is None and len(chosen) > 1:
-        some = ", ".join(paths[:8]) + (f" and {len(paths) - 8} more" if len(paths) > 8 else "")
-        raise InputError(f"holds {len(chosen)} mesh prims; choose one with prim = one of: {some}")
+        raise InputError(f"holds {len(chosen)} mesh prims; choose one with prim = one of: {list_some(paths)}")
     if prim is not None and prim != ALL_PRIMS:
         chosen = [p for p in chosen if str(p.GetPath()) == prim] or [p for p in chosen if p.GetName() == prim]
         if len(chosen) != 1:

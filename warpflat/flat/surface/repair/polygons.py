@@ -17,26 +17,16 @@ from warpflat.flat.surface.vectors import cross, dot, points_at
 __all__ = [
     "distinct_corners",
     "find_crossed_quads",
-    "list_some",
     "pad_corners",
     "pad_polygons",
     "split_polygons",
     "split_quads",
 ]
 
-# Indices of a list in a message.
-_MOST_LISTED = 8
 # As `split_quads` takes it: below it a corner is straight.
 _STRAIGHT = 1e-3
 # Entries of the table of faces, faces times the largest count of corners: a gigabyte.
 _MOST_CORNERS = 2**27
-
-
-def list_some(indices: ArrayLike) -> str:
-    """Return the beginning of a list of indices and the number of the others, such as `3, 4, 9 and 12 more`."""
-    values = np.asarray(indices).ravel()
-    shown = ", ".join(str(int(i)) for i in values[:_MOST_LISTED])
-    return shown if len(values) <= _MOST_LISTED else f"{shown} and {len(values) - _MOST_LISTED:,} more"
 
 
 def pad_polygons(polygons: ArrayLike | Sequence[Sequence[int]]) -> NDArray[np.int64]:

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import check_file_name, check_label
-from warpflat.core.text import area_words, format_count, quote_value
+from warpflat.core.text import area_words, format_count, list_some, quote_value
 from warpflat.flat.surface.connectivity import (
     border_loops,
     components,
@@ -33,7 +33,6 @@ from warpflat.flat.surface.normals import flat_areas
 from warpflat.flat.surface.repair.polygons import (
     distinct_corners,
     find_crossed_quads,
-    list_some,
     pad_polygons,
     split_polygons,
     split_quads,
