@@ -25,9 +25,9 @@ from warpflat.core import (
     listening_to_reads,
     make_file_name,
     quote_value,
-    refuse_to_replace_others,
     with_plain_letters,
 )
+from warpflat.pattern import refuse_to_replace_others
 
 __all__ = ["fit"]
 

@@ -105,8 +105,8 @@ def save_comparison(comparison: Comparison, folder: str | Path) -> tuple[list[st
         InputError: the folder cannot be written, or a surface was read from a file there that would be replaced.
     """
     from warpflat.app.scene.compare_picture import write_overlay_picture, write_overlay_svg
-    from warpflat.core import optional_file, output_folder, remove_stale
     from warpflat.garment import write_compared_drapes
+    from warpflat.pattern import optional_file, output_folder, remove_stale
 
     sources = [
         file for pieces in comparison.results.values() for piece in pieces.values() for file in piece.surface.sources

@@ -11,9 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from warpflat.app.scene.comparison import Comparison, outline
-from warpflat.core import atomic_path
 from warpflat.flat import border_of
-from warpflat.pattern import all_letters, new_figure, write_figure
+from warpflat.pattern import all_letters, atomic_path, new_figure, write_figure
 
 __all__ = ["write_overlay_picture", "write_overlay_svg"]
 

@@ -21,7 +21,6 @@ from warpflat.core import (
     IntArray,
     find_unused_name,
     off_line,
-    optional_step,
     polyline_length,
     quote_value,
     unit,
@@ -74,6 +73,7 @@ from warpflat.pattern import (
     default_grain,
     joint_words,
     line_labels,
+    optional_step,
     piece_from_mesh,
 )
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, dart_words, optional_step, polyline_length
+from warpflat.core import FloatArray, InputError, dart_words, polyline_length
 from warpflat.pattern.drafting.allowance import cut_hole, cut_outline
 from warpflat.pattern.drafting.curves import TOLERANCE, Curve
 from warpflat.pattern.drafting.drafted import (
@@ -45,6 +45,7 @@ from warpflat.pattern.drafting.seam_difference import SEAM_TOLERANCE
 from warpflat.pattern.drafting.sides import Side, Wedge
 from warpflat.pattern.drafting.truing import CornerReport, true_corners
 from warpflat.pattern.drafting.words import printed_in
+from warpflat.pattern.files.output import optional_step
 
 __all__ = ["draft_garment", "draft_half", "draft_piece", "nest_label", "relabelled"]
 

@@ -9,13 +9,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.core import FloatArray, InputError, IntArray, nearest, optional_step
+from warpflat.core import FloatArray, InputError, IntArray, nearest
 from warpflat.flat import MEET, border_loops, parted, runs_without
 from warpflat.pattern.drafting.corners import find_corners, find_cracks
 from warpflat.pattern.drafting.piece_parts import LEFT_OUT, SAME_POINT, Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import Piece, check_hole
 from warpflat.pattern.drafting.placement import default_grain
 from warpflat.pattern.drafting.polygons import signed_area, upright
+from warpflat.pattern.files.output import optional_step
 
 __all__ = ["MeshFeatures", "line_labels", "piece_from_mesh"]
 
