@@ -73,12 +73,11 @@ def plan_cuts(surface: Surface, tables: Sequence[CutTable]) -> CutSequence:
         line_part,
         open_with_cuts,
         path_length,
-        plane_path,
-        plane_section,
         polyline_path,
         tube_borders,
         without_overlaps,
     )
+    from warpflat.garment import plane_path, plane_section
 
     names = [table.name or table.line or f"cut {number + 1}" for number, table in enumerate(tables)]
     drawn: dict[int, str] = {}

@@ -25,12 +25,12 @@ from warpflat.flat import (
     given_options,
     grain_axes,
     make_stages,
-    relax_under_equations,
     springs_of,
     step_matrix,
     stretch_factor,
     with_stiffness,
 )
+from warpflat.garment.construction.augmented_lagrangian import relax_under_equations
 
 __all__ = ["FullEdge", "give_fullness", "measure_fullness"]
 

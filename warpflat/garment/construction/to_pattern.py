@@ -26,7 +26,6 @@ from warpflat.core import (
     unit,
 )
 from warpflat.flat import (
-    SAME_PLACE,
     are_curved,
     border_loops,
     fish_eye_measure,
@@ -51,6 +50,7 @@ from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.form_plan import EdgePlan, check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.construction.line_drawing import describe_worn
 from warpflat.garment.construction.mark_openings import mark_openings
+from warpflat.garment.construction.meet import SAME_PLACE
 from warpflat.garment.construction.mirror_pieces import draw_pairs_once
 from warpflat.garment.construction.openings import one_sided, place_opening
 from warpflat.garment.construction.pockets import add_pockets

@@ -37,12 +37,12 @@ from warpflat.flat import (
     make_surface,
     parts_of_faces,
     read_mesh_file,
-    surplus_faces,
     surplus_layers,
     weld_map,
     wrong_size,
 )
 from warpflat.garment.construction.file_seams import FileSeams
+from warpflat.garment.construction.overlapping_layers import surplus_faces
 from warpflat.garment.seams.options import SeamCut
 
 if TYPE_CHECKING:
