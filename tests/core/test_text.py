@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import pytest
-
-from warpflat.core.text import LONGEST_LINE, LONGEST_WORD, dart_words, line_name, one_line
+from warpflat.core.text import LONGEST_LINE, LONGEST_WORD, one_line
 
 
 def test_a_long_word_and_a_long_line_lose_their_middle() -> None:
@@ -17,26 +15,3 @@ def test_a_long_word_and_a_long_line_lose_their_middle() -> None:
 
 def test_lines_are_joined_and_control_characters_escaped() -> None:
     assert one_line("one\n  two\x1b[31m") == r"one two\x1b[31m"
-
-
-@pytest.mark.parametrize(
-    ("name", "line"),
-    [
-        ("neck left 2", "neck"),
-        ("waist 2 3", "waist"),
-        ("gore_2", "gore"),
-        ("panel2 left", "panel2"),
-        ("right.1", "right"),
-    ],
-)
-def test_a_number_that_is_a_word_of_its_own_is_no_part_of_a_line_name(name: str, line: str):
-    assert line_name(name) == line
-
-
-def test_a_dart_is_called_so_once() -> None:
-    assert [dart_words(name) for name in ("waist dart left", "bust_dart", "bust", "cut 2")] == [
-        "waist dart left",
-        "bust_dart",
-        "dart bust",
-        "dart cut 2",
-    ]

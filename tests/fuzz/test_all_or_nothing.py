@@ -301,7 +301,7 @@ def test_what_a_hidden_folder_lists_of_other_places_is_left_alone(tmp_path: Path
 
 # --- an interruption at every line
 
-_WATCHED = ("/core/output.py", "contextlib.py")
+_WATCHED = ("/files/output.py", "contextlib.py")
 
 
 def _interrupted(action: Callable[[], None], at: int, watched: tuple[str, ...]) -> bool:

@@ -1,26 +1,23 @@
 """The paper: from a surface to a flat layout, and its cuts."""
 
-from .cutting.auto_cut import AutoCutTable as AutoCutTable
-from .cutting.auto_cut import RankedBy as RankedBy
 from .cutting.candidates import find_candidates as find_candidates
 from .cutting.candidates import peaks_in_words as peaks_in_words
 from .cutting.crack import LaidCloth as LaidCloth
 from .cutting.crack import Price as Price
 from .cutting.cut_piece import cut as cut
 from .cutting.cut_plan import CutPlan as CutPlan
-from .cutting.cut_plan import draw_line as draw_line
 from .cutting.cut_plan import line_part as line_part
+from .cutting.cut_plan import make_cuts as make_cuts
 from .cutting.dart_move import move_dart as move_dart
 from .cutting.ledger import LEAST_MOUTH as LEAST_MOUTH
 from .cutting.ledger import TRIED as TRIED
 from .cutting.ledger import Ledger as Ledger
 from .cutting.ledger import LedgerEntry as LedgerEntry
 from .cutting.ledger import best_of_few as best_of_few
-from .cutting.ledger import cut_automatically as cut_automatically
 from .cutting.ledger import make_ledger as make_ledger
+from .cutting.open_tube import draw_openings as draw_openings
 from .cutting.open_tube import open_tube as open_tube
-from .cutting.open_tube import open_with_cuts as open_with_cuts
-from .cutting.open_tube import without_overlaps as without_overlaps
+from .cutting.ranked_by import RankedBy as RankedBy
 from .cutting.remedies import advise as advise
 from .cutting.separate_pieces import cut_surfaces as cut_surfaces
 from .cutting.separate_pieces import separate as separate
@@ -122,11 +119,10 @@ from .surface.cut.crack import Crack as Crack
 from .surface.cut.dart import fish_eye_measure as fish_eye_measure
 from .surface.cut.dart_legs import are_curved as are_curved
 from .surface.cut.dart_legs import check_tip_back as check_tip_back
-from .surface.cut.dart_legs import open_length as open_length
 from .surface.cut.dart_legs import pull_back as pull_back
-from .surface.cut.dart_legs import pull_back_eye as pull_back_eye
+from .surface.cut.pieces import lines_after_cut as lines_after_cut
 from .surface.cut.split_faces import split_faces_along as split_faces_along
-from .surface.falloff import falloff_weights as falloff_weights
+from .surface.falloff import harmonic_values as harmonic_values
 from .surface.grid import grid_quads as grid_quads
 from .surface.half_edges import HalfEdges as HalfEdges
 from .surface.half_edges import border_edges as border_edges
@@ -168,7 +164,6 @@ from .surface.paths.band import NARROW_BAND as NARROW_BAND
 from .surface.paths.edge_paths import are_joined as are_joined
 from .surface.paths.edge_paths import as_vertex as as_vertex
 from .surface.paths.edge_paths import path_length as path_length
-from .surface.paths.edge_paths import runs_without as runs_without
 from .surface.paths.lines import line_between as line_between
 from .surface.paths.lines import line_from_curve as line_from_curve
 from .surface.paths.lines import line_from_indices as line_from_indices

@@ -12,9 +12,13 @@ from .drafting.from_mesh import MEET as MEET
 from .drafting.from_mesh import MeshFeatures as MeshFeatures
 from .drafting.from_mesh import line_labels as line_labels
 from .drafting.from_mesh import piece_from_mesh as piece_from_mesh
+from .drafting.from_mesh import runs_without as runs_without
 from .drafting.marker import Cloth as Cloth
 from .drafting.marker import make_marker as make_marker
 from .drafting.matched_lay import Stripes as Stripes
+from .drafting.names import MADE_TO_MEASURE as MADE_TO_MEASURE
+from .drafting.names import line_name as line_name
+from .drafting.names import unnumbered as unnumbered
 from .drafting.notches import even_notches as even_notches
 from .drafting.piece_parts import DEFAULT_ALLOWANCE as DEFAULT_ALLOWANCE
 from .drafting.piece_parts import FOLD_STRAIGHT as FOLD_STRAIGHT
@@ -75,6 +79,7 @@ from .export.ledger_picture import candidate_words as candidate_words
 from .export.ledger_picture import write_ledger_picture as write_ledger_picture
 from .export.letters import all_letters as all_letters
 from .export.letters import note_on_names as note_on_names
+from .export.letters import plain_letters as plain_letters
 from .export.obj import write_obj as write_obj
 from .export.packing import rows_on_table as rows_on_table
 from .export.pattern_files import CLOTH_WIDTH as CLOTH_WIDTH

@@ -7,12 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from warpflat.app.review.figures import aligned
 from warpflat.app.scene.comparison import Comparison
 from warpflat.app.scene.drape import drape_scene
 from warpflat.app.scene.form_shaping import require_open_darts, settle_shape, with_open_darts
 from warpflat.app.scene.load import Scene, scene_fabric
 from warpflat.app.scene.plan import plan_scene
-from warpflat.core import InputError, aligned, laid_upon
+from warpflat.core import InputError, laid_upon
 from warpflat.flat import Progress, advise, judge
 from warpflat.garment import Garment
 from warpflat.pattern import STRAINS

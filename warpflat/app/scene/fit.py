@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.app.review.faults import is_done
-from warpflat.app.review.figures import count_pieces
+from warpflat.app.review.figures import aligned, count_pieces
 from warpflat.app.scene.load import errors_named, make_scene, scene_fabric
 from warpflat.app.scene.options import COMMAND_LINE, errors_of_options
-from warpflat.core import InputError, aligned, listening_to_reads, nearest, quote_value
+from warpflat.core import InputError, listening_to_reads, nearest, quote_value
 from warpflat.flat import METRES_PER_UNIT
 from warpflat.garment import EASE_LEVELS, EASE_RANGE
 from warpflat.pattern import atomic_path

@@ -21,7 +21,6 @@ from warpflat.flat import (
     Relaxation,
     RelaxOptions,
     border_loops,
-    falloff_weights,
     given_options,
     grain_axes,
     make_stages,
@@ -31,6 +30,7 @@ from warpflat.flat import (
     with_stiffness,
 )
 from warpflat.garment.construction.augmented_lagrangian import relax_under_equations
+from warpflat.garment.construction.carry import falloff_weights
 
 __all__ = ["FullEdge", "give_fullness", "measure_fullness"]
 

@@ -29,7 +29,6 @@ from warpflat.flat import (
     RelaxOptions,
     SpringNetwork,
     cut_sides,
-    falloff_weights,
     given_options,
     grain_alignments,
     is_injective,
@@ -39,6 +38,7 @@ from warpflat.flat import (
     stiffness_matrix,
 )
 from warpflat.garment.construction.augmented_lagrangian import ConstrainedOutcome, factor_pays, relax_under_equations
+from warpflat.garment.construction.carry import falloff_weights
 from warpflat.garment.construction.constraint_equations import (
     ConstraintEquations,
     Correction,

@@ -31,15 +31,12 @@ from warpflat.flat import (
     fish_eye_measure,
     grain_axes,
     join_labels,
-    open_length,
     pull_back,
-    pull_back_eye,
-    runs_without,
     seam_kind,
     separate,
 )
 from warpflat.garment.construction.closed_cuts import CLOSED, are_closed, close_cuts, seams_of_cuts
-from warpflat.garment.construction.darts import pleat_depths
+from warpflat.garment.construction.darts import open_length, pleat_depths, pull_back_eye
 from warpflat.garment.construction.ease import measure_ease
 from warpflat.garment.construction.edges import SHORT, lengths_of, with_pieces
 from warpflat.garment.construction.equal_pieces import draw_equal_pieces_once
@@ -75,6 +72,7 @@ from warpflat.pattern import (
     line_labels,
     optional_step,
     piece_from_mesh,
+    runs_without,
 )
 
 if TYPE_CHECKING:

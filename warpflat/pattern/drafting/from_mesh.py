@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpflat.core import FloatArray, InputError, IntArray, nearest
-from warpflat.flat import OVERLAP, border_loops, runs_without
+from warpflat.flat import OVERLAP, border_loops
 from warpflat.pattern.drafting.corners import find_corners, find_cracks
 from warpflat.pattern.drafting.piece_parts import LEFT_OUT, SAME_POINT, Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import Piece, check_hole
@@ -18,7 +18,7 @@ from warpflat.pattern.drafting.placement import default_grain
 from warpflat.pattern.drafting.polygons import signed_area, upright
 from warpflat.pattern.files.output import optional_step
 
-__all__ = ["MEET", "MeshFeatures", "line_labels", "piece_from_mesh"]
+__all__ = ["MEET", "MeshFeatures", "line_labels", "piece_from_mesh", "runs_without"]
 
 #: Borders that run along each other within this distance [m] are meant to meet.
 MEET = 1e-3
@@ -225,6 +225,17 @@ def line_labels(loop: IntArray, curves: Mapping[str, IntArray]) -> list[str]:
             label.setdefault((min(a, b), max(a, b)), key)
     around = [*loop.tolist(), int(loop[0])]
     return [label.get((min(a, b), max(a, b)), "") for a, b in pairwise(around)]
+
+
+def runs_without(path: IntArray, edges: Collection[tuple[int, ...]]) -> list[IntArray]:
+    """Return the runs of a path, as vertex indices, between the edges of it that are among `edges`, each as (lower, higher) vertex."""
+    runs: list[list[int]] = [[]]
+    for a, b in pairwise(path.tolist()):
+        if (min(a, b), max(a, b)) in edges:
+            runs.append([])
+        else:
+            runs[-1] += [b] if runs[-1] else [a, b]
+    return [np.array(run, dtype=np.int32) for run in runs if run]
 
 
 def _parted(ring: FloatArray) -> FloatArray:

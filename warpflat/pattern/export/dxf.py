@@ -23,7 +23,6 @@ from warpflat.core import (
     control_in,
     find_unused_name,
     nearest,
-    plain_letters,
     resample,
     turning_angles,
 )
@@ -32,7 +31,7 @@ from warpflat.pattern.drafting.label import text_width
 from warpflat.pattern.drafting.layout import lay_out, nests
 from warpflat.pattern.drafting.measures import INCH
 from warpflat.pattern.drafting.seam_words import seam_words
-from warpflat.pattern.export.letters import titles
+from warpflat.pattern.export.letters import plain_letters, titles
 from warpflat.pattern.files.output import atomic_path
 from warpflat.pattern.files.source_date import source_date
 

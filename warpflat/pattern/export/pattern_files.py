@@ -17,12 +17,12 @@ from warpflat.core import (
     make_file_name,
     nearest,
     other_kind_words,
-    plain_letters,
     report_activity,
     same_file,
 )
 from warpflat.pattern.drafting.edge_rules import EdgeRules
 from warpflat.pattern.drafting.shrinkage import Shrinkage, enlarged
+from warpflat.pattern.export.letters import plain_letters
 from warpflat.pattern.files.left_out import LeftOut, listening_to_left_out
 from warpflat.pattern.files.output import file_in, optional_step, output_folder, record_file, write_json, write_report
 
