@@ -25,7 +25,6 @@ from .file_kinds import other_kind_words as other_kind_words
 from .file_names import check_file_name as check_file_name
 from .file_names import check_label as check_label
 from .file_names import make_file_name as make_file_name
-from .file_names import make_piece_name as make_piece_name
 from .file_names import plain_label as plain_label
 from .file_names import same_file as same_file
 from .input_files import FARTHEST as FARTHEST
@@ -76,7 +75,6 @@ from .text import without_side as without_side
 from .threads import thread_count as thread_count
 from .toml_file import Table as Table
 from .toml_file import check_table as check_table
-from .toml_file import in_metres as in_metres
 from .toml_file import read_toml as read_toml
 from .usd_layers import check_layers as check_layers
 from .usd_process import UNREADABLE as UNREADABLE

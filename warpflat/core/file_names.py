@@ -12,7 +12,6 @@ __all__ = [
     "check_file_name",
     "check_label",
     "make_file_name",
-    "make_piece_name",
     "plain_label",
     "same_file",
 ]
@@ -75,11 +74,6 @@ def make_file_name(name: str) -> str:
     plain = "".join("_" if _is_forbidden(letter) else letter for letter in name).strip().lstrip(".")
     short = plain.encode()[:_MOST_BYTES].decode(errors="ignore")
     return f"_{short}" if _is_device(short) else short or "piece"
-
-
-def make_piece_name(name: str) -> str:
-    """Return a piece's name made of one that was not chosen for it, such as that of a material: an edge of it is "piece.edge"."""
-    return make_file_name(name).replace(".", "_")
 
 
 def same_file(name: str) -> str:

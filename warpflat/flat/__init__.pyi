@@ -153,7 +153,6 @@ from .surface.mesh import join_surfaces as join_surfaces
 from .surface.mesh import read_only as read_only
 from .surface.mesh import store_results as store_results
 from .surface.normals import area_vectors as area_vectors
-from .surface.normals import face_normals as face_normals
 from .surface.normals import flat_areas as flat_areas
 from .surface.normals import mean_normals as mean_normals
 from .surface.normals import vertex_normals as vertex_normals
@@ -179,7 +178,6 @@ from .surface.paths.trace import make_path as make_path
 from .surface.paths.trace import path_triangles as path_triangles
 from .surface.paths.trace import polyline_path as polyline_path
 from .surface.paths.trace import simplify_places as simplify_places
-from .surface.repair.layers import SAME_LAYER as SAME_LAYER
 from .surface.repair.layers import Layer as Layer
 from .surface.repair.layers import lies_within as lies_within
 from .surface.repair.layers import surplus_layers as surplus_layers

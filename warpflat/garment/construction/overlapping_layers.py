@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from warpflat.core import BoolArray, FloatArray, InputError, IntArray, area_words, format_count
 from warpflat.flat import (
-    SAME_LAYER,
     Layer,
     distinct_corners,
     flat_areas,
@@ -91,10 +90,10 @@ def surplus_faces(vertices: FloatArray, polygons: NDArray[np.int64], part: IntAr
 def _covered_faces(layer: Layer, other: Layer) -> BoolArray:
     """Return #F, which faces of a layer lie on another one: their corners and their middles do."""
     corners = np.where(layer.faces >= 0, layer.faces, layer.faces[:, :1])
-    covered: BoolArray = np.all(other.is_at(layer.vertices, SAME_LAYER)[corners], axis=1)
+    covered: BoolArray = np.all(other.is_at(layer.vertices)[corners], axis=1)
     rows = np.flatnonzero(covered)
     middles = layer.vertices[layer.faces[rows, :3]].mean(axis=1)
-    covered[rows] = other.is_at(middles, SAME_LAYER)
+    covered[rows] = other.is_at(middles)
     return covered
 
 

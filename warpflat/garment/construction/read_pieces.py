@@ -9,7 +9,7 @@ from os import PathLike
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import FloatArray, InputError, IntArray, area_words, format_count, make_file_name, make_piece_name
+from warpflat.core import FloatArray, InputError, IntArray, area_words, format_count, make_file_name
 from warpflat.flat import (
     ALL_PRIMS,
     POSSIBLE,
@@ -29,7 +29,7 @@ from warpflat.garment.construction.meet import meet_borders
 from warpflat.garment.construction.overlapping_layers import overlap_notes
 from warpflat.pattern import MEET
 
-__all__ = ["object_parts", "read_pieces"]
+__all__ = ["make_piece_name", "object_parts", "read_pieces"]
 
 
 def read_pieces(
@@ -120,6 +120,11 @@ def read_pieces(
     )
     notes += met
     return (replace(kept[0], notes=tuple(dict.fromkeys([*notes, *kept[0].notes]))), *kept[1:])
+
+
+def make_piece_name(name: str) -> str:
+    """Return a piece's name made of one that was not chosen for it, such as that of a material: an edge of it is "piece.edge"."""
+    return make_file_name(name).replace(".", "_")
 
 
 def object_parts(

@@ -17,15 +17,14 @@ from warpflat.flat.surface.repair.sheets import inner_sheets
 from warpflat.flat.surface.triangles import triangulate
 
 __all__ = [
-    "SAME_LAYER",
     "Layer",
     "doubled_layers",
     "lies_within",
     "surplus_layers",
 ]
 
-#: Layers nowhere further apart than this [m] are one: thinner than any cloth.
-SAME_LAYER = 5e-5
+# Layers nowhere further apart than this [m] are one: thinner than any cloth.
+_SAME_LAYER = 5e-5
 # Areas of one layer in two meshes agree within this share.
 _SAME_AREA = 0.02
 # Triangles that are tried as the nearest to a point, by their middles.
@@ -65,8 +64,8 @@ class Layer:
         reach = float(np.linalg.norm(corners - middles[:, None], axis=2).max(initial=0.0))
         return corners, cKDTree(middles), reach
 
-    def is_at(self, points: FloatArray, distance: float) -> BoolArray:
-        """Return which points (#P by 3 [m]) lie within a distance [m] of it; some that do may count as further off."""
+    def is_at(self, points: FloatArray, distance: float = _SAME_LAYER) -> BoolArray:
+        """Return which points (#P by 3 [m]) lie within a distance [m] of it, else on it; some that do may count as further off."""
         found = (
             (points >= self.vertices.min(axis=0) - distance) & (points <= self.vertices.max(axis=0) + distance)
         ).all(axis=1)
@@ -131,7 +130,7 @@ def doubled_layers(layers: Sequence[Layer]) -> dict[int, int]:
     lower, upper = (np.array([bound(layer.vertices, axis=0) for layer in layers]) for bound in (np.min, np.max))
     doubled: dict[int, int] = {}
     for number, layer in enumerate(layers):
-        inside = (lower[number] >= lower - SAME_LAYER) & (upper[number] <= upper + SAME_LAYER)
+        inside = (lower[number] >= lower - _SAME_LAYER) & (upper[number] <= upper + _SAME_LAYER)
         for other in np.flatnonzero(inside.all(axis=1)).tolist():
             if other == number or other in doubled:
                 continue
@@ -140,8 +139,8 @@ def doubled_layers(layers: Sequence[Layer]) -> dict[int, int]:
             if ((other < number or fewer) and _has_faces(whole, layer)) or (
                 other < number
                 and abs(whole.area - layer.area) <= _SAME_AREA * max(whole.area, layer.area)
-                and lies_within(whole, layer, SAME_LAYER)
-                and lies_within(layer, whole, SAME_LAYER)
+                and lies_within(whole, layer, _SAME_LAYER)
+                and lies_within(layer, whole, _SAME_LAYER)
             ):
                 doubled[number] = other
                 break
@@ -156,7 +155,7 @@ def lies_within(layer: Layer, other: Layer, distance: float) -> bool:
 
 
 def _has_faces(whole: Layer, part: Layer) -> bool:
-    place, near = whole.vertices_at(part.vertices, SAME_LAYER)
+    place, near = whole.vertices_at(part.vertices, _SAME_LAYER)
     if not near.all():
         return False
     known = {tuple(sorted(face)) for face in whole.faces.tolist()}
