@@ -90,7 +90,7 @@ def child(scene: str, folder: str, compact: str) -> None:
     """Run a scene in this process as the program does; print the processor seconds of film and page, imports among them."""
     from warpflat.app.cli.run import start_warp_silently
     from warpflat.app.scene.cuts import scene_with
-    from warpflat.core.beside import work_beside
+    from warpflat.pattern.files.beside import work_beside
 
     spent, inside = {"film": 0.0, "page": 0.0}, []
 

@@ -78,8 +78,8 @@ PARTS = {
     "drape": ("app.scene.drape:write_drape",),
     "film for the page": ("app.review.page:pack_frames",),
     "review": ("app.review.page:write_review", "app.review.page:pack_pictures"),
-    "metrics, hashes": ("core.output:remove_stale",),
-    "waiting": ("core.beside:Beside.result",),
+    "metrics, hashes": ("pattern.files.output:remove_stale",),
+    "waiting": ("pattern.files.beside:Beside.result",),
     "report": ("app.cli.run:report_run",),
 }  # fmt: skip
 # The parts in order, with those that are measured by themselves.

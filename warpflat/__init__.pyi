@@ -39,7 +39,6 @@ from .flat import make_shape as make_shape
 from .flat import make_surface as make_surface
 from .flat import move_dart as move_dart
 from .flat import open_tube as open_tube
-from .flat import read_pieces as read_pieces
 from .flat import read_surface as read_surface
 from .flat import relaxation as relaxation
 from .flat import separate as separate
@@ -70,6 +69,7 @@ from .garment import form_names as form_names
 from .garment import garment_files as garment_files
 from .garment import pattern_of_garment as pattern_of_garment
 from .garment import read_layers as read_layers
+from .garment import read_pieces as read_pieces
 from .garment import recover_pattern as recover_pattern
 from .garment import save_drape as save_drape
 from .garment import sew as sew

@@ -33,9 +33,8 @@ def test_a_run_reports_what_it_does_besides_steps(tmp_path: Path, monkeypatch: p
         "form = 'a_line_skirt'\nhalf = true\n[mannequin]\nsize = 'EU 38'\nresolution_mm = 40\n"
         "[marker]\nwidth = 1.5\nseconds = 1\n[output]\nframes = 0\n"
     )
-    monkeypatch.setattr(
-        "warpflat.core.beside.thread_count", lambda: 1
-    )  # of what a process beside does nothing is heard
+    # Of what a process beside does nothing is heard.
+    monkeypatch.setattr("warpflat.pattern.files.beside.thread_count", lambda: 1)
     heard: list[str] = []
     with activity_listener(heard.append):
         assert main(["run", "block.toml", "--quiet"]) == 0

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import pytest
-
-from warpflat.core.text import LONGEST_LINE, LONGEST_WORD, dart_words, line_name, list_some, one_line
+from warpflat.core.text import LONGEST_LINE, LONGEST_WORD, list_some, one_line
 
 
 def test_a_long_word_and_a_long_line_lose_their_middle() -> None:
@@ -23,26 +21,3 @@ def test_a_list_is_cut_short_with_the_number_of_the_others() -> None:
     assert list_some(["a", "b"], 2) == "a, b"
     assert list_some(range(2000), 3) == "0, 1, 2 and 1,997 more"
     assert list_some([]) == ""
-
-
-@pytest.mark.parametrize(
-    ("name", "line"),
-    [
-        ("neck left 2", "neck"),
-        ("waist 2 3", "waist"),
-        ("gore_2", "gore"),
-        ("panel2 left", "panel2"),
-        ("right.1", "right"),
-    ],
-)
-def test_a_number_that_is_a_word_of_its_own_is_no_part_of_a_line_name(name: str, line: str):
-    assert line_name(name) == line
-
-
-def test_a_dart_is_called_so_once() -> None:
-    assert [dart_words(name) for name in ("waist dart left", "bust_dart", "bust", "cut 2")] == [
-        "waist dart left",
-        "bust_dart",
-        "dart bust",
-        "dart cut 2",
-    ]

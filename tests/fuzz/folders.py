@@ -13,7 +13,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from warpflat.core.output import seal_of
+from warpflat.pattern.files.output import seal_of
 
 from .damage import WORDS, damaged_bytes, damaged_json, damaged_toml
 from .promise import Case

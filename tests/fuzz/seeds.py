@@ -14,7 +14,7 @@ from typing import Any
 from surface_meshes import quads_between
 
 from warpflat.app.cli.main import main
-from warpflat.core.output import seal_of
+from warpflat.pattern.files.output import seal_of
 
 from .promise import CLOTH, words
 

@@ -17,15 +17,15 @@ import pytest
 
 import warpflat
 from warpflat.app.cli.main import main
-from warpflat.core import output
 from warpflat.core.errors import InputError
-from warpflat.core.output import atomic_path, output_folder, prepare_folder, remove_file, write_json
 from warpflat.flat.flattening.flatten_piece import flatten
 from warpflat.flat.surface.shapes import make_shape
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.output import write_mannequin
 from warpflat.pattern.export.piece_files import save_piece
 from warpflat.pattern.export.usd import FrameWriter
+from warpflat.pattern.files import output
+from warpflat.pattern.files.output import atomic_path, output_folder, prepare_folder, remove_file, write_json
 
 # A bodice has four cuts to compare, a dome thirty-one.
 SCENE = "[surface]\nshape = 'bodice'\nresolution = 9\n[output]\nframes = 4\n"
@@ -239,7 +239,7 @@ def _no_links(*_: object, **__: object) -> None:
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from warpflat.core.output import atomic_path, output_folder, remove_file
+from warpflat.pattern.files.output import atomic_path, output_folder, remove_file
 folder, number, links = Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3] == "True"
 replace = os.replace
 def fatal(source, target):
@@ -301,7 +301,7 @@ def test_what_a_hidden_folder_lists_of_other_places_is_left_alone(tmp_path: Path
 
 # --- an interruption at every line
 
-_WATCHED = ("/core/output.py", "contextlib.py")
+_WATCHED = ("/files/output.py", "contextlib.py")
 
 
 def _interrupted(action: Callable[[], None], at: int, watched: tuple[str, ...]) -> bool:

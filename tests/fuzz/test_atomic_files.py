@@ -14,10 +14,10 @@ from export_meshes import dome
 
 import warpflat
 from warpflat.core.errors import InputError
-from warpflat.core.output import atomic_path, output_folder, prepare_folder, write_json
 from warpflat.pattern.export.obj import write_obj
 from warpflat.pattern.export.picture import PicturePiece, write_picture
 from warpflat.pattern.export.usd import FrameWriter
+from warpflat.pattern.files.output import atomic_path, output_folder, prepare_folder, write_json
 
 
 def test_file_appears_whole_and_nothing_else(tmp_path: Path) -> None:
@@ -50,7 +50,7 @@ def test_failure_leaves_what_was_there(tmp_path: Path) -> None:
 
 KILLED = """
 import os, signal, sys
-from warpflat.core.output import atomic_path
+from warpflat.pattern.files.output import atomic_path
 with atomic_path(sys.argv[1]) as temporary:
     temporary.write_text("half")
     os.kill(os.getpid(), signal.SIGKILL)

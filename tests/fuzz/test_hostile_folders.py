@@ -15,7 +15,7 @@ from command import Command
 
 from warpflat.app.batch.plan import load_batch
 from warpflat.app.cli.main import main
-from warpflat.core.output import seal_of
+from warpflat.pattern.files.output import seal_of
 
 SCENE = "[surface]\nshape = 'dome'\nresolution = 9\n[output]\nframes = 4\n[pattern]\nformats = ['svg', 'json']\n"
 STILL = SCENE.replace("frames = 4", "frames = 0")

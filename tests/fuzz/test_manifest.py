@@ -12,11 +12,11 @@ from warpflat.app.cli.main import main
 from warpflat.app.scene.load import make_scene
 from warpflat.app.scene.run import SceneResult, run_scene
 from warpflat.core.errors import CannotWriteError, InputError
-from warpflat.core.output import remove_stale
 from warpflat.flat.flattening.flatten_piece import flatten
 from warpflat.flat.surface.shapes import make_shape
 from warpflat.pattern.export.pattern_files import export_patterns
 from warpflat.pattern.export.piece_files import save_piece
+from warpflat.pattern.files.output import remove_stale
 
 PATTERN = {"cap.dxf", "cap.svg", "pattern.pdf", "pattern.json"}
 

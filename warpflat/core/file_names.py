@@ -6,17 +6,14 @@ import re
 import unicodedata
 
 from warpflat.core.errors import InputError
-from warpflat.core.text import control_in, plain_letters, quote_value
+from warpflat.core.text import control_in, quote_value
 
 __all__ = [
     "check_file_name",
     "check_label",
     "make_file_name",
-    "make_piece_name",
     "plain_label",
-    "plain_name",
     "same_file",
-    "with_plain_letters",
 ]
 
 # Hidden beginnings, separators and drives lead elsewhere; the others Windows refuses.
@@ -77,32 +74,6 @@ def make_file_name(name: str) -> str:
     plain = "".join("_" if _is_forbidden(letter) else letter for letter in name).strip().lstrip(".")
     short = plain.encode()[:_MOST_BYTES].decode(errors="ignore")
     return f"_{short}" if _is_device(short) else short or "piece"
-
-
-def make_piece_name(name: str) -> str:
-    """Return a piece's name made of one that was not chosen for it, such as that of a material: an edge of it is "piece.edge"."""
-    return make_file_name(name).replace(".", "_")
-
-
-def with_plain_letters(name: str, others: str = "_.-") -> str:
-    """Return a name of plain letters that is like another one: "Ärmel (1)" becomes "Armel_1"; it may be empty."""
-    return re.sub(rf"[^A-Za-z0-9{re.escape(others)}]+", "_", plain_letters(name)).strip(others)
-
-
-def plain_name(name: str, others: str = " _.-") -> str:
-    """Return the name of a scene or cut if it has plain letters only, since it is typed in a shell and part of other names.
-
-    Raises:
-        ValueError: it has letters beyond A to Z, a to z, 0 to 9 and `others`, or does not begin with one of the former.
-    """
-    if re.fullmatch(rf"[A-Za-z0-9][A-Za-z0-9{re.escape(others)}]*", name):
-        return name
-    better = with_plain_letters(name, others)
-    hint = f"; {quote_value(better)} would do" if better else ""
-    raise ValueError(
-        f"{quote_value(name)} cannot name files: it must begin with one of a to z, A to Z, 0 to 9, and may have besides them only "
-        f"{'spaces and ' if ' ' in others else ''}{' '.join(others.strip())}{hint}"
-    )
 
 
 def same_file(name: str) -> str:

@@ -4,38 +4,23 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Container, Iterable
 
 __all__ = [
-    "MADE_TO_MEASURE",
-    "aligned",
+    "area_words",
     "control_in",
-    "dart_words",
+    "energy_words",
     "find_unused_name",
     "format_count",
-    "line_name",
     "list_some",
-    "name_without_number",
     "one_line",
     "other_side",
-    "plain_letters",
     "quote_value",
-    "size_words",
-    "unnumbered",
     "without_side",
 ]
 
 #: Letters of a message, of one of its words (a path may be one), and of the user's own words in it, at most.
 LONGEST_LINE, LONGEST_WORD, LONGEST_SHOWN = 1500, 300, 60
-
-#: The size of what is made to somebody's own measures; after a size's name where these replace some of the size's.
-MADE_TO_MEASURE = "made to measure"
-
-#: Letters that are no letter with an accent.
-_LETTERS = str.maketrans(
-    {"ß": "ss", "æ": "ae", "Æ": "Ae", "œ": "oe", "Œ": "Oe", "ø": "o", "Ø": "O", "ł": "l", "Ł": "L", "đ": "d", "Đ": "D"}
-    | {"ð": "d", "Ð": "D", "þ": "th", "Þ": "Th", "ı": "i"}
-)
 
 
 def format_count(number: int, what: str) -> str:
@@ -55,30 +40,10 @@ def area_words(area: float) -> str:
     return f"{1e4 * area:,.0f} cm2" if 1e4 * area >= 10.0 else f"{1e4 * area:.2g} cm2"
 
 
-def size_words(size: str) -> str:
-    """Return the words for a size: "size EU 38", "size EU 38 made to measure", "made to measure"."""
-    return size if size == MADE_TO_MEASURE else f"size {size}"
-
-
 def without_side(name: str) -> str:
     """Return a name without its side, left or right: the shoulder of "shoulder left"; underscores become spaces."""
     words = name.replace("_", " ").split(" ")
     return " ".join(word for word in words if word not in ("left", "right")) or name
-
-
-def dart_words(name: str) -> str:
-    """Return what a dart is called: "waist dart left", "dart bust"; the word is said once."""
-    return name if "dart" in without_side(name).split(" ") else f"dart {name}"
-
-
-def line_name(name: str) -> str:
-    """Return what the line of an edge is called, without side and number: the neck of "neck left 2"."""
-    return unnumbered(without_side(name))
-
-
-def unnumbered(name: str) -> str:
-    """Return a name without its number, which tells it from others of its kind: the waist of "waist 2", the side of "side.1"."""
-    return re.sub(r"([ .]\d+)+$", "", name)
 
 
 def other_side(name: str) -> str:
@@ -104,19 +69,6 @@ def _is_control(letter: str) -> bool:
     if "\u202a" <= letter <= "\u202e" or "\u2066" <= letter <= "\u2069" or ord(letter) & 0xFFFE == 0xFFFE:
         return True
     return unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp")
-
-
-def aligned(head: Sequence[str], rows: Sequence[Sequence[str]], *, left: Sequence[int] = (0,)) -> str:
-    """Return rows in columns under their heads, aligned to the right but for the columns listed in `left`."""
-    table = [head, *rows]
-    widths = [max(len(row[column]) for row in table) for column in range(len(head))]
-    return "\n".join(
-        "  ".join(
-            cell.ljust(width) if column in left else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in table
-    )
 
 
 def energy_words(joules: float) -> str:
@@ -149,21 +101,9 @@ def _shortened(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[:half]}...{text[-half:]}"
 
 
-def plain_letters(text: str) -> str:
-    """Return a text without the accents of its letters: "Ärmel" becomes "Armel"."""
-    apart = unicodedata.normalize("NFKD", text.translate(_LETTERS))
-    return "".join(letter for letter in apart if not unicodedata.combining(letter))
-
-
 def find_unused_name(name: str, taken: Container[str], *, joint: str = " ") -> str:
     """Return the name itself if it is not in `taken`, else "name 2" or the first number after that which is free, joined so."""
     number = 2
     while f"{name}{joint}{number}" in taken:
         number += 1
     return f"{name}{joint}{number}" if name in taken else name
-
-
-def name_without_number(name: str, names: Container[str]) -> str:
-    """Return "waist" for "waist 2" where `names` has a "waist", of which that is a further stretch; else the name itself."""
-    line, _, number = name.rpartition(" ")
-    return line if number.isdigit() and line in names else name

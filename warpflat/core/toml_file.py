@@ -20,7 +20,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["Table", "check_table", "in_metres", "read_toml"]
+__all__ = ["Table", "check_table", "read_toml"]
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -48,11 +48,6 @@ class Table(BaseModel):
     def given(self) -> dict[str, Any]:
         """Return what the file says, by its own keys; without what holds by default."""
         return self.model_dump(exclude_unset=True, by_alias=True)
-
-
-def in_metres(key: str) -> property:
-    """Return a property of a table: the length [m] that it has under a key in millimetres."""
-    return property(lambda table: 1e-3 * getattr(table, key))
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -30,10 +30,13 @@ from .construction.garment import Garment as Garment
 from .construction.garment_files import garment_files as garment_files
 from .construction.garment_files import surface_files as surface_files
 from .construction.level_ease import EASE_LEVELS as EASE_LEVELS
+from .construction.meet import meet_borders as meet_borders
 from .construction.openings import part_at_centres as part_at_centres
 from .construction.openings import sewn_centres as sewn_centres
 from .construction.openings import sized_opening as sized_opening
 from .construction.pulled_on import wide_enough as wide_enough
+from .construction.read_pieces import object_parts as object_parts
+from .construction.read_pieces import read_pieces as read_pieces
 from .construction.sew_pieces import name_seams as name_seams
 from .construction.sew_pieces import sew_pieces as sew_pieces
 from .construction.sew_pieces import unsewn_notes as unsewn_notes
@@ -107,4 +110,6 @@ from .seams.options import NO_PATTERN as NO_PATTERN
 from .seams.options import Direction as Direction
 from .seams.options import SeamCut as SeamCut
 from .seams.options import SeamOptions as SeamOptions
+from .seams.section import plane_path as plane_path
+from .seams.section import plane_section as plane_section
 from .seams.solid import is_whole_garment as is_whole_garment

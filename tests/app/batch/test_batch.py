@@ -22,7 +22,7 @@ from warpflat.app.cli.batch import batch
 from warpflat.app.scene.load import load_scene
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import read_result
-from warpflat.core.output import write_sealed
+from warpflat.pattern.files.output import write_sealed
 
 SCENES = Path(__file__).parents[3] / "scenes"
 PATCH = """

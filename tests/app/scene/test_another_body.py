@@ -24,12 +24,12 @@ from warpflat.app.scene.fit import (
     study_table,
 )
 from warpflat.core.errors import InputError
-from warpflat.core.output import refuse_to_replace_others
 from warpflat.garment.construction.file_seams import file_seams
 from warpflat.garment.construction.sewn_panels import read_sewn_panels
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation
 from warpflat.garment.mannequin.closest import Mesh
 from warpflat.garment.seams.layers import read_garment
+from warpflat.pattern.files.output import refuse_to_replace_others
 
 BARE = ("--frames", "0", "--no-picture", "--quiet")
 ON = ("--from", "EU 36")

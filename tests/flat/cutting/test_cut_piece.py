@@ -12,15 +12,15 @@ import pytest
 from numpy.typing import NDArray
 
 import warpflat
+from warpflat.app.scene.auto_cut import AutoCutTable, cut_automatically
 from warpflat.app.scene.cuts import plan_cuts
 from warpflat.app.scene.schema import CutTable
 from warpflat.core.errors import InputError
-from warpflat.flat.cutting.auto_cut import AutoCutTable
 from warpflat.flat.cutting.candidates import find_candidates, find_peaks
 from warpflat.flat.cutting.cut_piece import cut
-from warpflat.flat.cutting.cut_plan import CutPlan, draw_line, line_part
+from warpflat.flat.cutting.cut_plan import CutPlan, line_part
 from warpflat.flat.cutting.dart_move import move_dart
-from warpflat.flat.cutting.ledger import cut_automatically, make_ledger
+from warpflat.flat.cutting.ledger import make_ledger
 from warpflat.flat.cutting.refine_piece import refine_along
 from warpflat.flat.cutting.separate_pieces import separate
 from warpflat.flat.flattening.progress import Progress
@@ -32,6 +32,7 @@ from warpflat.flat.surface import half_edges as mesh_half_edges
 from warpflat.flat.surface.cells import face_creases, make_cells
 from warpflat.flat.surface.cut.cut_mesh import cut_along
 from warpflat.flat.surface.cut.pieces import apply_cut
+from warpflat.flat.surface.cut.split_faces import split_faces_along
 from warpflat.flat.surface.io.read import read_surface
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.paths.lines import line_on_plane, with_lines
@@ -406,7 +407,8 @@ def test_a_dart_moved_to_another_line_keeps_its_budget(bust_cut: Flattening):
 def test_a_path_between_points_is_straight_on_the_surface_and_not_a_staircase():
     surface = make_shape("cylinder", radius=0.15, height=0.4, angle=180.0, resolution=21, triangles=True)
     start, end = surface.vertices[3], surface.vertices[21 * 13 + 8]
-    drawn = draw_line(surface, "slant", geodesic_path(surface, start, end))
+    split = split_faces_along(surface, geodesic_path(surface, start, end))
+    drawn = replace(split.surface, lines={**split.surface.lines, "slant": split.path})
     points = drawn.vertices[drawn.lines["slant"]]
     flat = np.column_stack([0.15 * np.arctan2(points[:, 0], points[:, 2]), points[:, 1]])
     chord = flat[-1] - flat[0]

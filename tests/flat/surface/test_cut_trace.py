@@ -1,33 +1,23 @@
-"""Straight paths across faces: geodesics, plane sections, and the faces split along them."""
+"""Straight paths across faces: geodesics, and the faces split along them."""
 
 from __future__ import annotations
 
 import os
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
-from cut_meshes import cylinder, dome, edge_set, flat, glue, grid, surface
+from cut_meshes import broken_by_split, cylinder, dome, flat, glue, grid, surface
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
 from warpflat.core.errors import InputError
-from warpflat.flat.surface.connectivity import euler_characteristic, non_manifold_vertices
 from warpflat.flat.surface.cut.cut_mesh import cut_along
 from warpflat.flat.surface.cut.split_faces import split_faces_along
-from warpflat.flat.surface.half_edges import border_edges, half_edges
-from warpflat.flat.surface.paths.section import plane_path, plane_section, plane_sections
+from warpflat.flat.surface.half_edges import border_edges
 from warpflat.flat.surface.paths.trace import VertexStar, geodesic_path, locate, path_triangles, polyline_path
 
 DATA = os.environ.get("WARPFLAT_DATA")
-
-
-def triangle_areas(mesh):
-    triangles, face = path_triangles(mesh)
-    a, b, c = (mesh.vertices[triangles[:, k]] for k in range(3))
-    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), face
 
 
 def smallest_angles(mesh):
@@ -37,36 +27,6 @@ def smallest_angles(mesh):
         u, v = corner[:, (k + 1) % 3] - corner[:, k], corner[:, (k + 2) % 3] - corner[:, k]
         angles.append(np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v)))
     return np.min(angles, axis=0)
-
-
-def border_length(mesh):
-    ends = mesh.vertices[border_edges(mesh.faces)]
-    return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
-
-
-def broken_by_split(mesh, result):
-    """What holds of every split, and not of this one: the same surface, no hanging vertex, correct maps, lines along edges."""
-    new, count = result.surface, len(mesh.vertices)
-    blend = np.einsum("nk,nkd->nd", result.vertex_weights, mesh.vertices[result.vertex_support])
-    area_before, face_before = triangle_areas(mesh)
-    area_after, face_after = triangle_areas(new)
-    whole = np.bincount(face_before, weights=area_before)
-    parts = np.bincount(result.face_origin[face_after], weights=area_after)
-    edges = edge_set(new.faces)
-    steps = [tuple(sorted(step)) for line in [result.path, *new.lines.values()] for step in pairwise(line.tolist())]
-    holds = {
-        "given vertices stay": np.array_equal(new.vertices[:count], mesh.vertices),
-        "weights give the new vertices": np.allclose(new.vertices, blend, rtol=0.0, atol=1e-12),
-        "the input gives the vertices": np.array_equal(new.input_vertices[new.input_index], new.vertices),
-        "parts fill their faces": np.allclose(parts, whole, rtol=1e-10, atol=1e-12 * whole.max()),
-        "it is a manifold": half_edges(new.faces).count.max() <= 2 and len(non_manifold_vertices(new.faces)) == 0,
-        # A vertex hanging on an edge would be a slit, and hence border.
-        "the border is as long": border_length(new) == pytest.approx(border_length(mesh), rel=1e-12),
-        "it is no other surface": euler_characteristic(new.faces) == euler_characteristic(mesh.faces),
-        "faces use every vertex": np.array_equal(np.unique(new.faces[new.faces >= 0]), np.arange(len(new.vertices))),
-        "lines run along edges": edges.issuperset(steps),
-    }
-    return [what for what, is_so in holds.items() if not is_so]
 
 
 def test_locate_finds_vertices_edges_and_faces():
@@ -189,86 +149,6 @@ def test_polyline_goes_through_its_points_and_may_close():
     assert cut.kind == "hole"
 
 
-def test_plane_section_of_a_dome_lies_in_its_plane_and_reaches_the_border():
-    mesh = dome(12, kinds=np.full(121, 2))
-    normal = np.array([0.3, 1.0, 0.1])
-    path = plane_path(mesh, [0.05, 0.06, 0.44], normal)
-    place = locate(mesh, [0.05, 0.06, 0.44])
-    origin = sum(w * mesh.vertices[v] for v, w in place.items())
-    assert np.abs((path.points - origin) @ normal).max() < 1e-12
-    assert not path.closed
-    border = {tuple(sorted(edge)) for edge in border_edges(mesh.faces).tolist()}
-    for end in (0, -1):
-        assert tuple(sorted(v for v in path.support[end].tolist() if v >= 0)) in border
-    assert broken_by_split(mesh, split_faces_along(mesh, path)) == []
-    cut_kind = cut_along((new := split_faces_along(mesh, path)).surface.faces, [new.path], vertex_count=1000).kind
-    assert cut_kind == "split"
-
-
-@pytest.mark.parametrize("point", [78, [0.05, 0.06, 0.44], [0.03, 0.0375, 0.44]])
-def test_plane_section_towards_a_side_is_a_dart_that_ends_at_its_point(point):
-    mesh = dome(12, kinds=np.full(121, 1))
-    place = locate(mesh, point)
-    origin = sum(w * mesh.vertices[v] for v, w in place.items())
-    for towards in ([1, 0, 0], [-1, 0, 0]):
-        path = plane_path(mesh, point, [0.1, 1.0, 0.0], towards=towards)
-        np.testing.assert_allclose(path.points[-1], origin, atol=1e-12)
-        assert (path.points[0] - origin) @ towards > 0.1
-        result = split_faces_along(mesh, path)
-        assert broken_by_split(mesh, result) == []
-        cut = cut_along(result.surface.faces, [result.path], vertex_count=len(result.surface.vertices))
-        assert cut.kind == "dart"
-        assert cut.tips.tolist() == [result.path[-1]]
-
-
-def test_a_plane_all_through_is_as_it_was_given():
-    mesh = dome(12, kinds=np.full(121, 2))
-    normal = np.array([0.3, 1.0, 0.1])
-    for point in ([0.05, 0.06, 0.44], [0.05, 0.06, 0.0], [2.0, -0.5, 0.25]):
-        path = plane_section(mesh, point, normal)
-        assert np.abs((path.points - point) @ normal).max() < 1e-12
-        result = split_faces_along(mesh, path)
-        assert cut_along(result.surface.faces, [result.path], vertex_count=len(result.surface.vertices)).kind == "split"
-    # A tube's wall is met on either side of the axis.
-    tube = cylinder(12, 5, triangles=True)
-    for side in (1.0, -1.0):
-        path = plane_section(tube, [3.0 * side, 0.011, 0.1], [0.0, 1.0, 0.0])
-        assert (side * path.points[:, 0] > 0).all()
-    with pytest.raises(
-        InputError, match=r"does not cut the piece .*: along its normal the piece spans .* and the plane"
-    ):
-        plane_section(tube, [0.0, 0.0, 9.0], [0.0, 0.0, 1.0])
-    with pytest.raises(InputError, match="not all zero"):
-        plane_section(tube, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
-    with pytest.raises(InputError, match="a plane's point is three finite numbers"):
-        plane_section(tube, [0.0, 0.1], [0.0, 0.0, 1.0])
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_a_plane_through_a_row_of_vertices_meets_them_whatever_rounding_does_to_their_heights(seed):
-    turn = Rotation.random(random_state=seed).as_matrix()
-    mesh = surface(flat(5, 5) @ turn.T + [0.3, -0.2, 0.7], grid(5, 5, kinds=np.ones(16, dtype=int)))
-    path = plane_path(mesh, mesh.vertices[12], turn @ [0.0, 1.0, 0.0])
-    assert sorted(path.support[:, 0].tolist()) == [10, 11, 12, 13, 14]
-    assert (path.support[:, 1:] == -1).all()
-
-
-def test_plane_around_a_tube_is_closed_and_straight_along_vertices():
-    tube = cylinder(12, 5, triangles=True)
-    path = plane_path(tube, [0.1, 0.0, 0.1], [0.0, 0.0, 1.0])
-    assert path.closed
-    assert path.length == pytest.approx(12 * 2 * 0.1 * np.sin(np.pi / 12))
-    result = split_faces_along(tube, path)
-    assert broken_by_split(tube, result) == []
-    # Twelve quads with a diagonal each, and the first vertex again.
-    assert len(result.path) == 2 * 12 + 1
-    through_vertices = plane_path(tube, 12, [0.0, 0.0, 1.0])
-    assert sorted(through_vertices.support[:, 0].tolist()) == list(range(12, 24))
-    assert (through_vertices.support[:, 1] < 0).all()
-    with pytest.raises(InputError, match="closed and reaches no border"):
-        plane_path(tube, 12, [0.0, 0.0, 1.0], towards=[0, 1, 0])
-
-
 def test_refusals():
     mesh = surface(flat(5, 5), grid(5, 5))
     with pytest.raises(InputError, match="two different end points; both are at vertex 3"):
@@ -279,10 +159,6 @@ def test_refusals():
         locate(mesh, [0.0, np.nan, 0.0])
     with pytest.raises(InputError, match="at least 3 points, got 2"):
         polyline_path(mesh, [0, 1], closed=True)
-    with pytest.raises(InputError, match="not all zero"):
-        plane_path(mesh, 12, [0.0, 0.0, 0.0])
-    with pytest.raises(InputError, match="only touches the surface at vertex 12"):
-        plane_path(mesh, 12, [0.0, 0.0, 1.0])
     with pytest.raises(InputError, match=r"snap is a share .* got 0.7"):
         split_faces_along(mesh, geodesic_path(mesh, 0, 13), snap=0.7)
     with pytest.raises(InputError, match="crosses itself"):
@@ -306,15 +182,10 @@ def test_random_paths_on_random_surfaces(seed, columns, rows, snap):
     if ends[0] == ends[1]:
         return
     points = vertices[ends] + rng.normal(scale=0.01, size=(2, 3))
-    which = int(rng.integers(0, 3))
-    if which == 0:
+    if int(rng.integers(0, 2)):
         path = geodesic_path(mesh, int(ends[0]), int(ends[1]))
-    elif which == 1:
-        path = geodesic_path(mesh, *points)
     else:
-        # From a vertex inside, a plane cannot merely touch the surface.
-        inside = (int(rng.integers(1, rows - 1)) * columns) + int(rng.integers(1, columns - 1))
-        path = plane_path(mesh, inside, np.append(rng.normal(size=2), 0.0))
+        path = geodesic_path(mesh, *points)
     try:
         result = split_faces_along(mesh, path, snap=snap)
     except InputError as error:
@@ -341,26 +212,3 @@ def test_a_scan_with_slivers():
     for _ in range(4):
         a, b = vertices[rng.integers(0, len(vertices), 2)]
         assert broken_by_split(mesh, split_faces_along(mesh, geodesic_path(mesh, a, b))) == []
-    centre = vertices.mean(axis=0) + np.array([0, 0, 0.2])
-    path = plane_path(mesh, centre, [0.0, 1.0, 0.0])
-    result = split_faces_along(mesh, path)
-    assert broken_by_split(mesh, result) == []
-    cut = cut_along(result.surface.faces, [result.path], vertex_count=len(result.surface.vertices))
-    assert cut.kind == "split"
-
-
-@pytest.mark.parametrize("towards", [[0.0, 1.0, 0.0], [0.0, -2.0, 0.0]])
-def test_half_a_plane_ends_at_its_point(towards):
-    """A curve from border to border is parted there, and a closed one where the half plane ends on both sides of it."""
-    mesh, at = dome(8), np.array([0.0113, 0.0371, 0.0])
-    whole = plane_section(mesh, at, [1.0, 0.0, 0.0])
-    (half,) = plane_sections(mesh, at, [1.0, 0.0, 0.0], towards=towards)
-    (other,) = plane_sections(mesh, at, [1.0, 0.0, 0.0], towards=[-part for part in towards])
-    along = (half.points - at) @ np.sign(towards)
-    assert along.min() == pytest.approx(0.0, abs=1e-9)
-    assert along[[0, -1]].min() == along.min()
-    assert half.length + other.length == pytest.approx(whole.length, rel=1e-9)
-    (arc,) = plane_sections(cylinder(12, 5), [0.0, 0.0137, 0.11], [0.0, 0.0, 1.0], towards=towards)
-    assert not arc.closed
-    assert arc.points[[0, -1], 1] == pytest.approx(0.0137, abs=1e-9)
-    assert ((arc.points[1:-1, 1] - 0.0137) * towards[1] > 0.0).all()

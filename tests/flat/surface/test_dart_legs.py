@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warpflat.core.errors import InputError
-from warpflat.flat.surface.cut.dart_legs import are_curved, pull_back, pull_back_eye
+from warpflat.flat.surface.cut.dart_legs import are_curved, pull_back
 
 
 def arc(start, end, bulge, count=41):
@@ -54,13 +54,3 @@ def test_a_tip_stays_within_its_dart(tip_back):
     left, right = arc((-0.05, 0.0), (0.0, 0.25), 0.0), arc((0.05, 0.0), (0.0, 0.25), 0.0)
     with pytest.raises(InputError, match=r"less than the dart's length, 250\.0 mm"):
         pull_back(left, right, tip_back)
-    with pytest.raises(InputError, match=r"less than the shorter half, 125\.0 mm"):
-        pull_back_eye(arc((0, 0), (0, 0.25), 0.1), arc((0, 0), (0, 0.25), -0.1), 20, tip_back)
-
-
-def test_a_fish_eye_keeps_its_width_and_its_sides_their_symmetry():
-    left, right = arc((0, 0), (0, 0.25), 0.1), arc((0, 0), (0, 0.25), -0.1)
-    new_left, new_right = pull_back_eye(left, right, 20, 0.03)
-    np.testing.assert_allclose(new_left[[0, -1]], [(0, 0.03), (0, 0.22)], atol=1e-12)
-    np.testing.assert_allclose(new_left[20], left[20], atol=1e-12)
-    np.testing.assert_allclose(new_left, new_right * [-1, 1], atol=1e-12)

@@ -11,7 +11,7 @@ import pytest
 from warpflat.core.errors import InputError
 from warpflat.flat.surface.io.raw_mesh import RawMesh
 from warpflat.flat.surface.io.read_obj import read_obj
-from warpflat.flat.surface.io.read_pieces import read_pieces
+from warpflat.garment.construction.read_pieces import read_pieces
 
 GRID = 12
 

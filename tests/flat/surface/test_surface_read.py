@@ -12,8 +12,8 @@ from warpflat.app.cli.main import main
 from warpflat.core.errors import InputError
 from warpflat.flat.surface.connectivity import chain_lines
 from warpflat.flat.surface.io.read import METRES_PER_UNIT, read_scan, read_surface
-from warpflat.flat.surface.io.read_pieces import read_pieces
 from warpflat.flat.surface.triangles import triangulate
+from warpflat.garment.construction.read_pieces import read_pieces
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 

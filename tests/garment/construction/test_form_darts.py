@@ -10,9 +10,8 @@ from warpflat.app.scene.load import make_scene
 from warpflat.app.scene.plan import plan_garment
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
-from warpflat.flat.surface.cut.dart_legs import open_length
 from warpflat.flat.surface.overlap import OVERLAP
-from warpflat.garment.construction.darts import closed_darts
+from warpflat.garment.construction.darts import closed_darts, open_length
 from warpflat.garment.construction.form_garment import flatten_form
 from warpflat.garment.construction.to_pattern import pattern_of_garment
 from warpflat.garment.mannequin.bricks import select_bricks

@@ -11,9 +11,9 @@ from obj_files import write_obj
 from surface_meshes import quads_between
 
 from warpflat.flat.surface.io.read import read_surface
-from warpflat.flat.surface.io.read_pieces import read_pieces
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.repair.validate import make_surface
+from warpflat.garment.construction.read_pieces import read_pieces
 from warpflat.garment.construction.sew_pieces import meeting_borders, unsewn_borders
 
 

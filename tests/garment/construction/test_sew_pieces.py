@@ -16,9 +16,9 @@ from warpflat.app.scene.load import make_scene
 from warpflat.app.scene.run import run_scene
 from warpflat.core.errors import InputError
 from warpflat.flat.flattening.flatten_piece import flatten
-from warpflat.flat.surface.io.read_pieces import read_pieces
 from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.garment.construction import to_pattern
+from warpflat.garment.construction.read_pieces import read_pieces
 from warpflat.garment.construction.sew_pieces import meeting_borders, sew_pieces
 from warpflat.garment.construction.sewing import SewingNetwork
 from warpflat.garment.construction.to_pattern import LACKING, pattern_of_garment

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from warpflat.core.errors import InputError
-from warpflat.flat.surface.normals import face_normals
+from warpflat.core.vectors import unit
+from warpflat.flat.surface.normals import area_vectors
 from warpflat.garment.mannequin.layout import QUARTERS, make_layout
 from warpflat.garment.mannequin.mannequin import Mannequin
 
@@ -102,7 +103,7 @@ def test_smooth_across_brick_borders(body: Mannequin) -> None:
     layout = body.layout
     names = list(layout.bricks)
     trunk = np.array([not n.startswith(_NOT_TRUNK) for n in names])[layout.face_brick] & layout.on_body
-    normals = face_normals(body.vertices, layout.faces)
+    normals = unit(area_vectors(body.vertices, layout.faces))
     ends = np.stack([layout.faces, np.roll(layout.faces, -1, axis=1)], -1).reshape(-1, 2)
     owner = np.repeat(np.arange(len(layout.faces)), 4)
     order = np.lexsort(np.sort(ends, axis=1).T)

@@ -10,7 +10,8 @@ from bodies import body_of_size
 from self_intersections import self_intersections
 
 from warpflat.core.errors import InputError
-from warpflat.flat.surface.normals import face_normals
+from warpflat.core.vectors import unit
+from warpflat.flat.surface.normals import area_vectors
 from warpflat.garment.mannequin.layout import make_layout
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.measurements import (
@@ -60,7 +61,7 @@ def test_surface_is_sound(size: str) -> None:
     trunk = np.isin(body.layout.faces, rings).all(axis=1)
     middle = q.mean(axis=1)
     away = middle * [1.0, 0.0, 1.0] - [0.0, 0.0, float(middle[trunk, 2].mean())]
-    assert (np.einsum("ij,ij->i", face_normals(body.vertices, body.layout.faces), away)[trunk] > 0).all()
+    assert (np.einsum("ij,ij->i", unit(area_vectors(body.vertices, body.layout.faces)), away)[trunk] > 0).all()
 
 
 def test_left_and_right_are_mirror_images() -> None:

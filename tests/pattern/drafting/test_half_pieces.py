@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from polygons import corners_of, drafted, polygon
 
-from warpflat.core.left_out import LeftOut, listening_to_left_out
 from warpflat.core.polyline import polyline_length
 from warpflat.pattern.drafting.draft import draft_garment
 from warpflat.pattern.drafting.half_pieces import halved, is_symmetric
 from warpflat.pattern.drafting.piece_parts import Dart, Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece
+from warpflat.pattern.files.left_out import LeftOut, listening_to_left_out
 
 
 def back(wave: float) -> Piece:

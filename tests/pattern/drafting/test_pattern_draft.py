@@ -17,7 +17,6 @@ from polygons import drafted as drafted_alone
 from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
-from warpflat.core.left_out import LeftOut, listening_to_left_out
 from warpflat.core.polyline import arc_lengths, turning_angles
 from warpflat.pattern.drafting import draft
 from warpflat.pattern.drafting.curves import fit_curve
@@ -28,6 +27,7 @@ from warpflat.pattern.drafting.layout import lay_out, nests
 from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern.files.left_out import LeftOut, listening_to_left_out
 
 SIZES = ("36", "38", "40", "42", "44")
 # A square of 300 mm with a dart from its lower side, and the kinds of its edges.

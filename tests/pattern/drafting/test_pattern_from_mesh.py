@@ -10,9 +10,9 @@ from shapely.affinity import scale
 from surface_meshes import quads_between
 
 from warpflat.core.errors import InputError
-from warpflat.core.left_out import LeftOut, listening_to_left_out
 from warpflat.pattern.drafting.drawing import draw_piece
 from warpflat.pattern.drafting.from_mesh import MeshFeatures, piece_from_mesh
+from warpflat.pattern.files.left_out import LeftOut, listening_to_left_out
 
 
 def grid(columns=10, rows=12, width=0.2, height=0.3):

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpflat.app.batch.task import AT_REST, NOT_AT_REST, Row
-from warpflat.core import has_seal, read_result
+from warpflat.core import read_result
+from warpflat.pattern import has_seal
 
 __all__ = [
     "BODY_GIRTHS",

@@ -13,7 +13,7 @@ from pathlib import Path
 from warpflat._version import __version__
 from warpflat.app.batch.plan import Task
 from warpflat.app.batch.task import AT_REST, ERROR, NOT_AT_REST, SET_ASIDE, TO_DO, Row
-from warpflat.core import atomic_path, output_folder, write_report
+from warpflat.pattern import atomic_path, output_folder, write_report
 
 __all__ = ["BatchIndex"]
 

@@ -17,8 +17,9 @@ from pydantic import Field, model_validator
 from warpflat._version import __version__
 from warpflat.app.scene.as_toml import laid_over
 from warpflat.app.scene.load import Scene, errors_named, expand_variables, make_scene
+from warpflat.app.scene.plain_names import with_plain_letters
 from warpflat.app.scene.schema import PATH_KEYS
-from warpflat.core import InputError, Table, check_table, file_digest, quote_value, read_toml, with_plain_letters
+from warpflat.core import InputError, Table, check_table, file_digest, quote_value, read_toml
 from warpflat.garment import MannequinTable
 
 __all__ = ["BatchTable", "BodyTable", "Task", "TaskTable", "load_batch"]

@@ -10,7 +10,7 @@ from warpflat.app.batch.body_statistics import bodies_table, read_body_patterns
 from warpflat.app.batch.index import BatchIndex
 from warpflat.app.batch.plan import Task
 from warpflat.app.batch.task import Row, forget_starts, read_row, run_task
-from warpflat.core import atomic_path, optional_file, output_folder
+from warpflat.pattern import atomic_path, optional_file, output_folder
 
 __all__ = ["run_batch"]
 

@@ -16,18 +16,8 @@ from typing import Any
 
 from warpflat.app.batch.plan import Task
 from warpflat.app.review.faults import is_done
-from warpflat.core import (
-    InputError,
-    NotOursError,
-    is_number,
-    one_line,
-    open_file,
-    output_folder,
-    read_result,
-    refuse_to_replace_others,
-    remove_unfinished,
-    write_sealed,
-)
+from warpflat.core import InputError, is_number, one_line, open_file, read_result
+from warpflat.pattern import NotOursError, output_folder, refuse_to_replace_others, remove_unfinished, write_sealed
 
 __all__ = [
     "ERROR",

@@ -41,7 +41,7 @@ def compare(scene: Path, fabrics: tuple[str, ...], drape: bool, output: Output) 
     from warpflat.app.review.faults import faults_of
     from warpflat.app.scene.compare import compare_fabrics, compared_files, comparison_table, save_comparison
     from warpflat.app.scene.load import load_scene
-    from warpflat.core import output_folder
+    from warpflat.pattern import output_folder
 
     job = load_scene(scene)
     start_warp_silently()

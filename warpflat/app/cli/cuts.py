@@ -70,7 +70,7 @@ def cuts(
         # Edit a dart, and compare the garment before and after.
         from warpflat.app.cli.tables import edit_table
         from warpflat.app.scene.form_edits import edit_dart
-        from warpflat.core import output_folder, write_report
+        from warpflat.pattern import output_folder, write_report
 
         (how, (dart, aim)), *more = edits
         if more:
@@ -100,8 +100,7 @@ def cuts(
     from warpflat.app.scene.form_shaping import sewn_form
     from warpflat.app.scene.ledger import cuts_of_entry, scene_ledger, with_cut
     from warpflat.app.scene.run import files_of_run, run_scene
-    from warpflat.core import expect_files, optional_file, output_folder, write_report
-    from warpflat.pattern import write_ledger_picture
+    from warpflat.pattern import expect_files, optional_file, output_folder, write_ledger_picture, write_report
 
     expected = ["ledger.json", "ledger.png", *(files_of_run(loaded) if apply is not None else [])]
     result, written = None, list[str]()
@@ -139,7 +138,7 @@ def cuts(
 
 
 def _write_toml(folder: Path, heading: str, tables: Sequence[str]) -> None:
-    from warpflat.core import atomic_path
+    from warpflat.pattern import atomic_path
 
     with atomic_path(folder / "cuts.toml") as temporary:
         temporary.write_text("\n".join([f"# {heading}\n", *tables]), encoding="utf-8")

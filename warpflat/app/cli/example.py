@@ -32,7 +32,8 @@ def example(name: str | None, out: Path | None) -> int:
       warpflat example zip_dress
       warpflat run zip_dress.toml
     """
-    from warpflat.core import InputError, atomic_path, nearest
+    from warpflat.core import InputError, nearest
+    from warpflat.pattern import atomic_path
 
     found = example_files()
     if name is None:

@@ -19,15 +19,9 @@ from warpflat.app.cli.options import (
     tell,
 )
 from warpflat.app.cli.run import report_run, start_warp_silently
-from warpflat.core import (
-    InputError,
-    find_unused_name,
-    listening_to_reads,
-    make_file_name,
-    quote_value,
-    refuse_to_replace_others,
-    with_plain_letters,
-)
+from warpflat.app.scene.plain_names import with_plain_letters
+from warpflat.core import InputError, find_unused_name, listening_to_reads, make_file_name, quote_value
+from warpflat.pattern import refuse_to_replace_others
 
 __all__ = ["fit"]
 

@@ -18,7 +18,8 @@ from warpflat.app.cli.options import (
     scene_options,
 )
 from warpflat.app.cli.run import run_and_report
-from warpflat.core import InputError, quote_value, with_plain_letters
+from warpflat.app.scene.plain_names import with_plain_letters
+from warpflat.core import InputError, quote_value
 
 __all__ = ["drawn_seam", "flatten"]
 

@@ -32,17 +32,8 @@ from warpflat.app.cli.review import review
 from warpflat.app.cli.run import run
 from warpflat.app.cli.signals import INTERRUPTED, Stopped, signal_message, stop_on_signals
 from warpflat.app.cli.studio import studio
-from warpflat.core import (
-    InputError,
-    LeftOut,
-    is_out_of_memory,
-    listening_to_left_out,
-    memory_limit,
-    one_line,
-    source_date,
-    system_reason,
-    written_folders,
-)
+from warpflat.core import InputError, is_out_of_memory, memory_limit, one_line, system_reason
+from warpflat.pattern import LeftOut, listening_to_left_out, source_date, written_folders
 
 __all__ = ["cli", "main"]
 

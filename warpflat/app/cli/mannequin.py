@@ -57,8 +57,9 @@ def mannequin(
       warpflat mannequin --scan body.obj --units m --out body
     """
     from warpflat.app.cli.tables import mannequin_table, measures_table
-    from warpflat.core import check_table, output_folder
+    from warpflat.core import check_table
     from warpflat.garment import MANNEQUIN_FILES, MannequinTable, mannequin_from_table, write_mannequin
+    from warpflat.pattern import output_folder
 
     require_memory_for_usd()  # mannequin.usdc is always written
     tables: dict[str, Any] = {key: value for key, value in source.items() if value not in (None, False)}

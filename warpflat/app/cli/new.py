@@ -55,9 +55,10 @@ def new(
     """
     from warpflat.app.scene.style import STYLE_KEYS, style_options
     from warpflat.app.scene.wardrobe import garment_offer, offer_tables, offers, scene_text, style_of, taken_options
-    from warpflat.core import atomic_path, check_table
+    from warpflat.core import check_table
     from warpflat.flat import find_fabric, load_library
     from warpflat.garment import MannequinTable, mannequin_from_table
+    from warpflat.pattern import atomic_path
 
     name, chosen = _read_choices(words)
     if name is None:

@@ -27,7 +27,7 @@ def review(folder: Path, film: bool, sheet: bool, quiet: bool) -> int:
     from warpflat.app.cli.run import start_warp_silently
     from warpflat.app.review.moving_picture import write_moving_pictures
     from warpflat.app.review.page import read_run, review_folder
-    from warpflat.core import output_folder
+    from warpflat.pattern import output_folder
 
     read_run(folder)
     with output_folder(folder, guard=True):

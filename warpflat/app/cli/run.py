@@ -52,7 +52,7 @@ def run(scene: Path, shear_limit: float | None, output: Output) -> int:
 def run_and_report(scene: Scene, output: Output) -> int:
     """Run a scene, print what came out, and return the exit code."""
     from warpflat.app.cli.progress_bar import ProgressBar
-    from warpflat.core import Beside, work_beside
+    from warpflat.pattern import Beside, work_beside
 
     folder = output.folder(scene.name)
     with ExitStack() as stack:

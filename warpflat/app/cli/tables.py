@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
-from warpflat.app.review.figures import relaxation_words, seam_figures
-from warpflat.core import aligned, energy_words
+from warpflat.app.review.figures import aligned, relaxation_words, seam_figures
+from warpflat.core import energy_words
 from warpflat.flat import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_names
 
 if TYPE_CHECKING:

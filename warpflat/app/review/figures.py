@@ -54,3 +54,16 @@ def relaxation_words(pieces: Iterable[Sequence[Mapping[str, Any]]]) -> str:
         for unit in ("step", "iteration")
         if counts.get(unit)
     )
+
+
+def aligned(head: Sequence[str], rows: Sequence[Sequence[str]], *, left: Sequence[int] = (0,)) -> str:
+    """Return rows in columns under their heads, aligned to the right but for the columns listed in `left`."""
+    table = [head, *rows]
+    widths = [max(len(row[column]) for row in table) for column in range(len(head))]
+    return "\n".join(
+        "  ".join(
+            cell.ljust(width) if column in left else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in table
+    )

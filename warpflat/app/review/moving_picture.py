@@ -10,7 +10,7 @@ import numpy as np
 
 from warpflat.app.review.film import FilmPiece, open_film
 from warpflat.app.review.page import read_run
-from warpflat.core import FloatArray, InputError, atomic_path, output_folder, reading, record_file
+from warpflat.core import FloatArray, InputError, reading
 from warpflat.flat import border_edges
 from warpflat.pattern import (
     DPI,
@@ -22,7 +22,10 @@ from warpflat.pattern import (
     Scale,
     View,
     all_letters,
+    atomic_path,
+    output_folder,
     picture_of,
+    record_file,
     write_moving_picture,
 )
 

@@ -18,20 +18,8 @@ from urllib.parse import quote
 from warpflat.app.review.faults import faults_of
 from warpflat.app.review.figures import count_pieces, seam_figures
 from warpflat.app.review.film import open_film, pack_film, pack_foreign_film
-from warpflat.core import (
-    InputError,
-    atomic_path,
-    energy_words,
-    guarded,
-    latest_file,
-    open_file,
-    output_folder,
-    read_result,
-    record_file,
-    recorded_files,
-    report_activity,
-)
-from warpflat.pattern import SMALLEST_SCALE, Scale
+from warpflat.core import InputError, energy_words, guarded, open_file, read_result, report_activity
+from warpflat.pattern import SMALLEST_SCALE, Scale, atomic_path, latest_file, output_folder, record_file, recorded_files
 
 __all__ = ["pack_frames", "pack_pictures", "read_run", "review_folder", "write_review"]
 

@@ -7,12 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from warpflat.app.review.figures import aligned
 from warpflat.app.scene.comparison import Comparison, outline
 from warpflat.app.scene.drape import drape_scene
 from warpflat.app.scene.form_shaping import require_open_darts, settle_shape, with_open_darts
 from warpflat.app.scene.load import Scene, scene_fabric
 from warpflat.app.scene.plan import plan_scene
-from warpflat.core import InputError, aligned, laid_upon
+from warpflat.core import InputError, laid_upon
 from warpflat.flat import Progress, advise, judge
 from warpflat.garment import Garment
 from warpflat.pattern import STRAINS
@@ -105,9 +106,8 @@ def save_comparison(comparison: Comparison, folder: str | Path) -> tuple[list[st
         InputError: the folder cannot be written, or a surface was read from a file there that would be replaced.
     """
     from warpflat.app.scene.compare_picture import overlay_style, write_overlay_picture
-    from warpflat.core import optional_file, output_folder, remove_stale
     from warpflat.garment import write_compared_drapes
-    from warpflat.pattern import write_overlay_svg
+    from warpflat.pattern import optional_file, output_folder, remove_stale, write_overlay_svg
 
     sources = [
         file for pieces in comparison.results.values() for piece in pieces.values() for file in piece.surface.sources

@@ -12,7 +12,8 @@ from warpflat.core import InputError, IntArray, find_unused_name, quote_value, w
 from warpflat.garment import Form, FormDart, Mannequin, part_pieces, taken_over
 
 if TYPE_CHECKING:
-    from warpflat.flat import AutoCutTable, CutPlan, Flattening, RelaxOptions, Surface
+    from warpflat.app.scene.auto_cut import AutoCutTable
+    from warpflat.flat import CutPlan, Flattening, RelaxOptions, Surface
 
 __all__ = [
     "CutSequence",
@@ -64,21 +65,19 @@ def plan_cuts(surface: Surface, tables: Sequence[CutTable]) -> CutSequence:
     Raises:
         InputError: a line that does not exist, a path that leaves the surface or crosses itself; begins with the table.
     """
+    from warpflat.app.scene.tube_cuts import open_with_cuts, without_overlaps
     from warpflat.flat import (
         CutPlan,
         as_vertex,
         border_of,
         check_tip_back,
-        draw_line,
         line_part,
-        open_with_cuts,
         path_length,
-        plane_path,
-        plane_section,
         polyline_path,
+        split_faces_along,
         tube_borders,
-        without_overlaps,
     )
+    from warpflat.garment import plane_path, plane_section
 
     names = [table.name or table.line or f"cut {number + 1}" for number, table in enumerate(tables)]
     drawn: dict[int, str] = {}
@@ -98,7 +97,8 @@ def plan_cuts(surface: Surface, tables: Sequence[CutTable]) -> CutSequence:
                 else:
                     as_vertex(surface, table.plane.point)  # says so if the point is off the piece
                     path = plane_path(surface, table.plane.point, table.plane.normal, towards=table.plane.towards)
-                surface = draw_line(surface, line, path)
+                split = split_faces_along(surface, path)
+                surface = replace(split.surface, lines={**split.surface.lines, line: split.path})
             drawn[number] = line
     border = set(border_of(surface).tolist())
     paths: dict[str, list[IntArray]] = {}
@@ -154,8 +154,9 @@ def plan_automatic_cuts(
     Raises:
         InputError: a cut that is made before is refused.
     """
+    from warpflat.app.scene.auto_cut import cut_automatically
     from warpflat.core import InputError
-    from warpflat.flat import CutPlan, coarse_options, cut_automatically
+    from warpflat.flat import CutPlan, coarse_options
 
     # Energies are a little higher while the relaxation is coarse: whether a cut is needed is for the full one to say.
     search = auto.model_copy(update={"stop_below": 0.0, "stop_below_strain": 0.0})

@@ -67,8 +67,8 @@ def write_drape(
     metrics, notes = {"drape": draped.measures()}, tuple[str, ...]()
     if table.correct or table.correct_fabric is not None:
         # Correct the pattern, and write it beside the first.
-        from warpflat.core import optional_file
         from warpflat.garment import correct_pattern
+        from warpflat.pattern import optional_file
 
         report_activity("correcting the pattern")
         with errors_named(scene.where):

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from warpflat.core import FloatArray
-from warpflat.flat import MEET, Surface, check_range, grid_surface, make_named, meet_borders
+from warpflat.flat import Surface, check_range, grid_surface, make_named
+from warpflat.garment import meet_borders
+from warpflat.pattern import MEET
 
 __all__ = ["PIECES", "apron", "make_pieces", "sun_hat", "tote"]
 

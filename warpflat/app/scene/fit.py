@@ -13,19 +13,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.app.review.faults import is_done
-from warpflat.app.review.figures import count_pieces
+from warpflat.app.review.figures import aligned, count_pieces
 from warpflat.app.scene.load import errors_named, make_scene, scene_fabric
 from warpflat.app.scene.options import COMMAND_LINE, errors_of_options
-from warpflat.core import (
-    InputError,
-    aligned,
-    atomic_path,
-    listening_to_reads,
-    nearest,
-    quote_value,
-)
+from warpflat.core import InputError, listening_to_reads, nearest, quote_value
 from warpflat.flat import METRES_PER_UNIT
 from warpflat.garment import EASE_LEVELS, EASE_RANGE
+from warpflat.pattern import atomic_path
 
 if TYPE_CHECKING:
     from warpflat.app.scene.run import SceneResult
@@ -172,7 +166,7 @@ def fit_to(
         InputError: the garment cannot be flattened, or `out` cannot be written.
     """
     from warpflat.app.scene.run import files_of_run, run_scene
-    from warpflat.core import output_folder, record_file
+    from warpflat.pattern import output_folder, record_file
 
     patterned = keeps_pattern(job, tables)
     # The file's mesh on the body, with its texture, groups and materials, along which it may be cut.
@@ -273,7 +267,7 @@ def write_study(folder: Path, fitted: Sequence[Fitted]) -> tuple[tuple[str, ...]
         InputError: they cannot be written, or would replace what is not of warpflat.
     """
     from warpflat._version import __version__
-    from warpflat.core import output_folder, remove_stale
+    from warpflat.pattern import output_folder, remove_stale
 
     entries = [
         {**each.carried.as_dict(), "folder": str(each.folder), "fits": each.fits, "done": is_done(each.metrics)}

@@ -40,7 +40,6 @@ def found_seams(scene: Scene) -> FoundSeams | None:
     Raises:
         InputError: the file is wrong.
     """
-    from warpflat.flat import object_parts
     from warpflat.garment import (
         NO_PATTERN,
         SeamOptions,
@@ -49,6 +48,7 @@ def found_seams(scene: Scene) -> FoundSeams | None:
         find_seams,
         is_whole_garment,
         like_cut_pieces,
+        object_parts,
         read_garment,
     )
 

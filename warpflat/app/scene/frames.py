@@ -19,9 +19,9 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.app.scene.schema import OutputTable
-from warpflat.core import CannotWriteError, FloatArray, IntArray, optional_file, report_activity, system_reason
+from warpflat.core import CannotWriteError, FloatArray, IntArray, report_activity, system_reason
 from warpflat.flat import Surface, corner_means, half_edges
-from warpflat.pattern import Polylines
+from warpflat.pattern import Polylines, optional_file
 
 if TYPE_CHECKING:
     from warpflat.flat import CutPlan, Flattening, Progress
@@ -248,7 +248,7 @@ class Film:
     """Records the layouts of several pieces while they relax, and writes `frames.usdc` at the end of its ``with`` block.
 
     All pieces have the same frames: a stage takes as many as the piece that needs the most, and a piece without that stage stands still.
-    A film that cannot be made is left out; see :func:`warpflat.core.output.optional_file`.
+    A film that cannot be made is left out; see :func:`warpflat.pattern.files.output.optional_file`.
 
     Attributes:
         files: after the block: the names of the files that it has written.

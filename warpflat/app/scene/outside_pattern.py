@@ -337,7 +337,7 @@ def drape_outside(
     """
     import warp as wp
 
-    from warpflat.core import optional_file, output_folder, remove_stale, report_activity
+    from warpflat.core import report_activity
     from warpflat.flat import run_metrics
     from warpflat.garment import (
         Placement,
@@ -346,7 +346,7 @@ def drape_outside(
         relieve_pattern,
         write_drape_files,
     )
-    from warpflat.pattern import PatternOptions, write_pattern
+    from warpflat.pattern import PatternOptions, optional_file, output_folder, remove_stale, write_pattern
 
     table, pattern = job.sewing.drape, job.pattern
     cloth, notes = _fabric(job, fabric)

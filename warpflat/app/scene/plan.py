@@ -24,7 +24,7 @@ from warpflat.app.scene.pattern_options import pattern_options
 from warpflat.app.scene.schema import PieceTable
 from warpflat.app.scene.seams import scene_constraints, scene_surface_seams
 from warpflat.app.scene.surface import scene_pieces, scene_sewn_panels, scene_surface, with_piece_tables
-from warpflat.core import InputError, StepError, optional_step, report_activity, without_side
+from warpflat.core import InputError, StepError, report_activity, without_side
 from warpflat.flat import (
     Flattening,
     Progress,
@@ -62,7 +62,7 @@ from warpflat.garment import (
     straight_stands,
     unsewn_notes,
 )
-from warpflat.pattern import PatternOptions, check_names
+from warpflat.pattern import PatternOptions, check_names, optional_step
 
 if TYPE_CHECKING:
     from warpflat.pattern import Pattern

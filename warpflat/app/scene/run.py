@@ -19,18 +19,7 @@ from warpflat.app.scene.frames import MANNEQUIN, Film
 from warpflat.app.scene.load import Scene
 from warpflat.app.scene.plan import Plan, plan_scene
 from warpflat.app.scene.schema import FileSurface
-from warpflat.core import (
-    Beside,
-    StepError,
-    expect_files,
-    notes_left_out,
-    optional_file,
-    optional_step,
-    output_folder,
-    remove_stale,
-    report_activity,
-    require_memory_for_run,
-)
+from warpflat.core import StepError, report_activity, require_memory_for_run
 from warpflat.flat import Progress, Remedy, Surface, extent_words, judge
 from warpflat.garment import (
     FormResult,
@@ -39,7 +28,18 @@ from warpflat.garment import (
     garment_files,
     size_names,
 )
-from warpflat.pattern import WrittenPattern, note_on_names, pattern_names
+from warpflat.pattern import (
+    Beside,
+    WrittenPattern,
+    expect_files,
+    note_on_names,
+    notes_left_out,
+    optional_file,
+    optional_step,
+    output_folder,
+    pattern_names,
+    remove_stale,
+)
 
 if TYPE_CHECKING:
     from warpflat.pattern import DraftedOutline
@@ -81,7 +81,7 @@ def run_scene(
 
     Files: `metrics.json`, `NAME.obj` per piece, `frames.usdc`, `picture.png`, and the pattern (see
     `warpflat.pattern.export.pattern_files`). Files that an earlier run has left there and this one does not make are removed at the
-    end (see `warpflat.core.output`). All of that happens together; a run that fails leaves the folder
+    end (see `warpflat.pattern.files.output`). All of that happens together; a run that fails leaves the folder
     as it was, and no run replaces a file that it has read.
 
     Args:

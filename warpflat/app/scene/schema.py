@@ -16,10 +16,12 @@ from pydantic import (
     model_validator,
 )
 
+from warpflat.app.scene.auto_cut import AutoCutTable
 from warpflat.app.scene.first_shapes import PIECES
 from warpflat.app.scene.options import Dialect, Paper, PatternFormat, PrintedUnit
-from warpflat.core import Table, is_number, plain_name, quote_value
-from warpflat.flat import DEFAULT_FABRIC, AutoCutTable, FabricTable, RelaxOptions
+from warpflat.app.scene.plain_names import plain_name
+from warpflat.core import Table, is_number, quote_value
+from warpflat.flat import DEFAULT_FABRIC, FabricTable, RelaxOptions
 from warpflat.garment import (
     Direction,
     DrapeOptions,

@@ -141,7 +141,8 @@ def scene_pieces(scene: Scene) -> tuple[Surface, ...] | None:
         InputError: the file or a parameter of the shape is wrong, or an environment variable is not set.
     """
     from warpflat.app.scene.first_shapes import PIECES, make_pieces
-    from warpflat.flat import MEET, read_pieces
+    from warpflat.garment import read_pieces
+    from warpflat.pattern import MEET
 
     table = scene.settings.surface
     if isinstance(table, ShapeSurface) and table.shape in PIECES:

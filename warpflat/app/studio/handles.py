@@ -13,9 +13,10 @@ from warpflat.app.scene.cuts import asked_cuts, cut_of_dart, place_of
 from warpflat.app.scene.plan import GarmentPlan
 from warpflat.app.studio.cut_tables import rounded
 from warpflat.app.studio.solve import Solution
-from warpflat.core import FloatArray, arc_lengths, unit, unnumbered
+from warpflat.core import FloatArray, arc_lengths, unit
 from warpflat.flat import Crack, border_of, seam_kind, triangulate
 from warpflat.garment import FormDart, Mesh, Neckline, PlacedDart
+from warpflat.pattern import unnumbered
 
 __all__ = ["Handle", "pattern_handles"]
 

@@ -10,9 +10,11 @@ from typing import Any
 from warpflat.app.review.faults import is_done
 from warpflat.app.scene.as_toml import document_as_toml
 from warpflat.app.scene.load import Scene, load_scene
+from warpflat.app.scene.plain_names import plain_name, with_plain_letters
 from warpflat.app.scene.run import run_scene
-from warpflat.core import InputError, atomic_path, check_file_name, make_file_name, plain_name, with_plain_letters
+from warpflat.core import InputError, check_file_name, make_file_name
 from warpflat.flat import Progress
+from warpflat.pattern import atomic_path
 
 __all__ = ["Saved", "free_name", "run_saved", "scene_file", "write_scene"]
 

@@ -21,12 +21,10 @@ from warpflat.flat.flattening.applied_cut import AppliedCut
 from warpflat.flat.surface.cut.crack import Crack
 from warpflat.flat.surface.cut.cut_mesh import Cut, cut_along
 from warpflat.flat.surface.cut.pieces import apply_cut
-from warpflat.flat.surface.cut.split_faces import split_faces_along
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.paths.edge_paths import path_length
-from warpflat.flat.surface.paths.trace import SurfacePath
 
-__all__ = ["CutPlan", "CutSurface", "carry_layout", "draw_line", "line_part", "make_cuts"]
+__all__ = ["CutPlan", "CutSurface", "carry_layout", "line_part", "make_cuts"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,18 +72,6 @@ def line_part(surface: Surface, name: str, part: tuple[float, float] = (0.0, 1.0
             "from 0 to 1 that lie further apart"
         )
     return line[first : last + 1] if first < last else line[last : first + 1][::-1]
-
-
-def draw_line(surface: Surface, name: str, path: SurfacePath) -> Surface:
-    """Work a path into the edges of a surface, as a line of that name.
-
-    Raises:
-        InputError: the name is taken, or the path crosses itself.
-    """
-    if name in surface.lines:
-        raise InputError(f"piece {surface.name!r} already has a line {name!r}; call the cut something else")
-    drawn = split_faces_along(surface, path)
-    return replace(drawn.surface, lines={**drawn.surface.lines, name: drawn.path})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,11 +14,11 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import polyline_length
 from warpflat.core.short_repr import short_repr
-from warpflat.flat.cutting.auto_cut import AutoCutTable, RankedBy
 from warpflat.flat.cutting.candidates import Candidate, find_candidates, peaks_in_words
 from warpflat.flat.cutting.crack import Price
 from warpflat.flat.cutting.cut_piece import cut
 from warpflat.flat.cutting.cut_plan import CutPlan
+from warpflat.flat.cutting.ranked_by import RankedBy
 from warpflat.flat.cutting.refine_piece import refine_along
 from warpflat.flat.flattening.applied_cut import measure_crack
 from warpflat.flat.flattening.edit import relax_cut
@@ -31,7 +31,6 @@ __all__ = [
     "Ledger",
     "LedgerEntry",
     "best_of_few",
-    "cut_automatically",
     "evaluate",
     "make_ledger",
 ]
@@ -339,34 +338,3 @@ def evaluate(result: Flattening, candidate: Candidate, *, relax: RelaxOptions) -
         candidate=candidate,
         result=after,
     )
-
-
-def cut_automatically(
-    result: Flattening, auto: AutoCutTable, *, relax: RelaxOptions | None = None
-) -> tuple[Flattening, tuple[Ledger, ...]]:
-    """Cut greedily: try the candidates that promise most, make the best that helps, and again until it is enough.
-
-    Args:
-        result: the flattened piece.
-        auto: when to stop.
-        relax: options of the full relaxation, from which the coarse ones of the trials follow.
-
-    Returns:
-        The piece as the last trial left it, and the ledger of each round that made a cut.
-    """
-    ledgers: list[Ledger] = []
-    while len(ledgers) < auto.max_cuts and not auto.is_enough(result):
-        try:
-            # Of two cuts that mirror each other, both are made or none.
-            candidates = [one for one in find_candidates(result) if not one.has_twin]
-            ledger = make_ledger(result, relax=relax, by=auto.by, candidates=candidates, listed=False)
-        except InputError:
-            if not ledgers:
-                raise
-            break
-        best = next((entry for entry in ledger.entries if entry.helps), None)
-        if best is None or best.result is None:
-            break
-        ledgers.append(ledger)
-        result = best.result
-    return result, tuple(ledgers)

@@ -12,14 +12,13 @@ from warpflat.core.errors import InputError
 from warpflat.core.text import find_unused_name, quote_value
 from warpflat.flat.cutting.cut_plan import CutPlan, line_part, make_cuts
 from warpflat.flat.surface.connectivity import border_loops
-from warpflat.flat.surface.cut.pieces import lines_after_cut
 from warpflat.flat.surface.cut.split_faces import split_faces_along
 from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.paths.edge_paths import EdgeGraph, runs_without
+from warpflat.flat.surface.paths.edge_paths import EdgeGraph
 from warpflat.flat.surface.paths.trace import geodesic_path
 from warpflat.flat.surface.tubes import tube_borders
 
-__all__ = ["open_tube", "open_with_cuts", "without_overlaps"]
+__all__ = ["draw_openings", "open_tube"]
 
 
 def open_tube(surface: Surface, line: str | None = None) -> Surface:
@@ -45,82 +44,11 @@ def open_tube(surface: Surface, line: str | None = None) -> Surface:
             raise InputError(
                 f"line {quote_value(line)} does not cut piece {surface.name!r} open; it must run from one border to another"
             )
-    drawn, openings = _draw_openings(surface, ())
+    drawn, openings = draw_openings(surface, ())
     return make_cuts(drawn, openings).surface
 
 
-def open_with_cuts(surface: Surface, plans: Sequence[CutPlan]) -> tuple[Surface, list[CutPlan], list[CutPlan], Surface]:
-    """Make all cuts of a tube, open what is still a tube then, and make as few of them beforehand as it takes to lie flat in one piece.
-
-    Cuts and openings part each other into stretches. Each stretch of a cut is closed again, from the last to the first, unless this
-    makes a tube: what stays cut leaves one piece, whatever the order of the cuts.
-
-    Args:
-        surface: a tube, with the paths of all cuts along its edges.
-        plans: the cuts.
-
-    Returns:
-        The surface, cut so far that it is no tube; the cuts that are left to be made on it; the openings, on the fourth: the surface
-        uncut.
-
-    Raises:
-        InputError: a cut cannot be made.
-    """
-    drawn, openings = _draw_openings(surface, plans)
-    made = make_cuts(drawn, [*plans, *openings]).cuts
-    stretches = [(number, seam.path) for number, cut in enumerate(made) for seam in cut.seams]
-    apart = list(range(len(stretches)))
-    for stretch in reversed(range(len(stretches))):
-        if stretches[stretch][0] >= len(plans):
-            continue
-        fewer = [other for other in apart if other != stretch]
-        still_cut = tuple(stretches[other][1] for other in fewer)
-        try:
-            surface = make_cuts(drawn, [CutPlan(name="cut", paths=still_cut)]).surface if still_cut else drawn
-        except InputError:  # one edge with both ends inside separates nothing
-            continue
-        if not tube_borders(surface):
-            apart = fewer
-    before = [
-        CutPlan(
-            name=cut.name, paths=tuple(stretches[stretch][1] for stretch in apart if stretches[stretch][0] == number)
-        )
-        for number, cut in enumerate(made)
-    ]
-    opened = make_cuts(drawn, [plan for plan in before if plan.paths])
-    if opened.cut is None:
-        return drawn, list(plans), openings, drawn
-    edges = {tuple(sorted(edge)) for plan in before for path in plan.paths for edge in pairwise(path.tolist())}
-    left = []
-    for plan in plans:
-        rest = [run for path in plan.paths for run in runs_without(path, edges)]
-        paths = lines_after_cut({str(number): run for number, run in enumerate(rest)}, drawn.faces, opened.cut)
-        if paths:
-            left.append(replace(plan, paths=tuple(paths.values())))
-    return opened.surface, left, openings, drawn
-
-
-def without_overlaps(plans: Sequence[CutPlan]) -> tuple[list[CutPlan], list[str]]:
-    """Leave out of each cut what one before it cuts already: a plane cuts all around a tube, wherever its point lies.
-
-    Returns:
-        The cuts, without those of which nothing is left; the names of those of which something is left out.
-    """
-    taken: set[tuple[int, ...]] = set()
-    left, shorter = list[CutPlan](), list[str]()
-    for plan in plans:
-        edges = [tuple(sorted(edge)) for path in plan.paths for edge in pairwise(path.tolist())]
-        if taken.isdisjoint(edges):
-            left.append(plan)
-        else:
-            shorter.append(plan.name)
-            if paths := [run for path in plan.paths for run in runs_without(path, taken)]:
-                left.append(replace(plan, paths=tuple(paths)))
-        taken.update(edges)
-    return left, shorter
-
-
-def _draw_openings(surface: Surface, plans: Sequence[CutPlan]) -> tuple[Surface, list[CutPlan]]:
+def draw_openings(surface: Surface, plans: Sequence[CutPlan]) -> tuple[Surface, list[CutPlan]]:
     """Draw lines along which a surface with cuts is to be opened, where its borders are nearest to each other; none crosses a cut.
 
     Args:

@@ -24,7 +24,7 @@ def refine_along(result: Flattening, name: str, path: SurfacePath) -> tuple[Flat
     The refined mesh has springs of its own: compare energies with those of the refined piece, once it is relaxed.
 
     Raises:
-        InputError: as :func:`draw_line`.
+        InputError: the name is taken, or the path crosses itself.
     """
     require_unsewn(result)
     if name in result.surface.lines:

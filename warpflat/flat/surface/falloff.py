@@ -1,8 +1,6 @@
-"""Values given along a few lines of a mesh, interpolated harmonically in between."""
+"""Values known at some vertices of a mesh, interpolated harmonically in between."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,7 +8,7 @@ from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.sparse import factor_symmetric
 from warpflat.flat.surface.half_edges import mesh_edges
 
-__all__ = ["falloff_weights", "harmonic_values"]
+__all__ = ["harmonic_values"]
 
 
 def harmonic_values(faces: IntArray, value: FloatArray, known: BoolArray) -> FloatArray:
@@ -31,25 +29,3 @@ def harmonic_values(faces: IntArray, value: FloatArray, known: BoolArray) -> Flo
         laplacian = (diags(np.asarray(joined.sum(axis=1)).ravel()) - joined).tocsr()
         found[free] = factor_symmetric(laplacian[free][:, free])(joined[free] @ value)
     return found
-
-
-def falloff_weights(
-    faces: IntArray, given: Sequence[tuple[IntArray, FloatArray]], stops: Sequence[IntArray], count: int
-) -> FloatArray:
-    """Interpolate values given at some vertices over a mesh.
-
-    Args:
-        faces: #F by 4, -1 last in a triangle.
-        given: rows of vertices with a value for each.
-        stops: rows of vertices with 0.
-        count: #V.
-
-    Returns:
-        #V, the values given, and harmonic in between.
-    """
-    value, known = np.zeros(count), np.zeros(count, dtype=bool)
-    for stop in stops:
-        known[stop] = True
-    for vertices, values in given:
-        value[vertices], known[vertices] = values, True
-    return harmonic_values(faces, value, known)

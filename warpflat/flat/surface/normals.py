@@ -1,4 +1,4 @@
-"""Areas and normals of triangles and quads, and normals of the vertices between them."""
+"""Areas of triangles and quads with their normals, and normals of the vertices between them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray
 from warpflat.core.vectors import unit
 
-__all__ = ["area_vectors", "face_normals", "flat_areas", "mean_normals", "vertex_normals"]
+__all__ = ["area_vectors", "flat_areas", "mean_normals", "vertex_normals"]
 
 # Faces around a vertex cancel below this share of their area.
 _CANCEL = 1e-9
@@ -31,11 +31,6 @@ def area_vectors(positions: FloatArray, faces: NDArray[np.integer]) -> FloatArra
 def flat_areas(positions: FloatArray, faces: NDArray[np.integer]) -> FloatArray:
     """Return #F, the areas of faces [m2], as `area_vectors` takes them; of a quad that is bent, of its shadow along its normal."""
     return np.asarray(np.linalg.norm(area_vectors(positions, faces), axis=1))
-
-
-def face_normals(positions: FloatArray, faces: NDArray[np.integer]) -> FloatArray:
-    """Return unit normals of triangles or quads, #F by 3; zero for one without area."""
-    return unit(area_vectors(positions, faces))
 
 
 def vertex_normals(positions: FloatArray, faces: NDArray[np.integer]) -> FloatArray:

@@ -12,18 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from warpflat.core import (
-    FloatArray,
-    InputError,
-    make_file_name,
-    make_piece_name,
-    nearest,
-    quote_value,
-)
+from warpflat.core import FloatArray, InputError, make_file_name, nearest, quote_value
 from warpflat.flat import METRES_PER_UNIT, RawMesh, Surface, read_scan, triangulate
 from warpflat.garment.construction.carry import carry
 from warpflat.garment.construction.graded import graded_layout, stretches_worn
 from warpflat.garment.construction.level_ease import level_ease, widened
+from warpflat.garment.construction.read_pieces import make_piece_name
 from warpflat.garment.construction.sewn_panels import SewnPanel, sewn_panels, with_cuts
 from warpflat.garment.mannequin.body_model import finer_body
 from warpflat.garment.mannequin.closest import Mesh

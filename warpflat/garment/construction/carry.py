@@ -8,21 +8,23 @@ Borders that lie in a plane stay in one.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import FloatArray, factor_symmetric
+from warpflat.core import FloatArray, IntArray, factor_symmetric
 from warpflat.flat import (
     Surface,
     area_vectors,
     border_loops,
     cotangent_matrix,
-    falloff_weights,
+    harmonic_values,
     triangulate,
     vertex_normals,
 )
 
-__all__ = ["carry", "carry_points", "skin_frames", "skin_under"]
+__all__ = ["carry", "carry_points", "falloff_weights", "skin_frames", "skin_under"]
 
 # The nearest vertices of the skin that are asked, and over what distance they share [m, and as a share of the cloth's distance].
 _ASKED, _SHARED, _MORE = 96, 0.008, 0.5
@@ -149,3 +151,25 @@ def carry(surface: Surface, before: FloatArray, after: FloatArray, triangles: ND
 def _plane(points: FloatArray) -> FloatArray:
     """Return the normal of the plane nearest to points around the origin, #P by 3."""
     return np.linalg.svd(points, full_matrices=False)[2][-1]
+
+
+def falloff_weights(
+    faces: IntArray, given: Sequence[tuple[IntArray, FloatArray]], stops: Sequence[IntArray], count: int
+) -> FloatArray:
+    """Interpolate values given at some vertices over a mesh.
+
+    Args:
+        faces: #F by 4, -1 last in a triangle.
+        given: rows of vertices with a value for each.
+        stops: rows of vertices with 0.
+        count: #V.
+
+    Returns:
+        #V, the values given, and harmonic in between.
+    """
+    value, known = np.zeros(count), np.zeros(count, dtype=bool)
+    for stop in stops:
+        known[stop] = True
+    for vertices, values in given:
+        value[vertices], known[vertices] = values, True
+    return harmonic_values(faces, value, known)

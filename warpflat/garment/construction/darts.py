@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core import FloatArray, arc_lengths, nearest_on_polyline, polyline_length
-from warpflat.flat import LEAST_MOUTH, OVERLAP, open_length
+from warpflat.flat import LEAST_MOUTH, OVERLAP, check_tip_back
 from warpflat.garment.construction.closed_cuts import CLOSED
 from warpflat.garment.construction.constraints import DartMouth
 from warpflat.garment.construction.sewn import Stitching
@@ -140,3 +140,46 @@ def measure_darts(form: FormResult, name: str, positions: FloatArray) -> list[di
             }
         )
     return found
+
+
+def open_length(left: FloatArray, right: FloatArray) -> tuple[int, float]:
+    """Return how many of their points, from the border, two matched legs are open, and how far they overlap after that [m].
+
+    Args:
+        left, right: #P by 2 [m], from the border to the tip, which they share; the wedge lies on the right of the left leg.
+    """
+    middle = 0.5 * (left + right)
+    along = np.gradient(middle, axis=0)
+    across = right - left
+    gap = (along[:, 1] * across[:, 0] - along[:, 0] * across[:, 1]) / np.maximum(np.linalg.norm(along, axis=1), 1e-12)
+    closed = np.flatnonzero(gap[:-1] <= 0.0)
+    return (int(closed[0]) if len(closed) else len(left)), float(max(0.0, -gap[:-1].min()))
+
+
+def pull_back_eye(left: FloatArray, right: FloatArray, station: int, tip_back: float) -> tuple[FloatArray, FloatArray]:
+    """Return both sides of a fish-eye dart with their tips moved towards each other, as wide as before.
+
+    Args:
+        left, right: #P by 2 [m], matched, from the first tip to the last one.
+        station: the index of the widest points, which stay.
+        tip_back: of either tip [m].
+
+    Raises:
+        InputError: `tip_back` is negative or leaves no dart.
+    """
+    first, span = left[0], left[-1] - left[0]
+    length = float(np.linalg.norm(span))
+    axis = span / length
+    widest = float((0.5 * (left[station] + right[station]) - first) @ axis)
+    check_tip_back(tip_back, min(widest, length - widest), "shorter half")
+
+    def shortened(side: FloatArray) -> FloatArray:
+        reach = (side - first) @ axis
+        short = np.where(
+            reach < widest,
+            widest - (widest - reach) * (1 - tip_back / widest),
+            widest + (reach - widest) * (1 - tip_back / (length - widest)),
+        )
+        return side + np.multiply.outer(short - reach, axis)
+
+    return shortened(left), shortened(right)

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from warpflat.core import Table, in_metres, other_side, without_side
+from warpflat.core import Table, other_side, without_side
 
 __all__ = ["FinishingTable", "OpeningTable", "PocketTable", "SeamTable"]
 
@@ -19,6 +19,11 @@ _FINISHING_MM = {
     "casing": 30.0, "hood": 0.0, "hem": 0.0,
 }  # fmt: skip
 _COLLAR_MM = {"stand": 35.0, "shirt": 30.0, "convertible": 75.0, "flat": 65.0, "turtleneck": 60.0}
+
+
+def _in_metres(key: str) -> property:
+    """Return a property of a table: the length [m] that it has under a key in millimetres."""
+    return property(lambda table: 1e-3 * getattr(table, key))
 
 
 class OfKind(Table):
@@ -72,8 +77,8 @@ class OpeningTable(OfKind):
     tie_mm: Annotated[float, Field(ge=0, le=2000)] = 900.0
     """Length of the ties of a wrap; 0 for none."""
 
-    start, button, spacing = in_metres("start_mm"), in_metres("button_mm"), in_metres("spacing_mm")
-    facing_width, tie = in_metres("facing_mm"), in_metres("tie_mm")
+    start, button, spacing = _in_metres("start_mm"), _in_metres("button_mm"), _in_metres("spacing_mm")
+    facing_width, tie = _in_metres("facing_mm"), _in_metres("tie_mm")
 
     @property
     def length(self) -> float:
@@ -188,9 +193,9 @@ class FinishingTable(OfKind):
     strip_mm: Annotated[float, Field(ge=0, le=250)] = 0.0
     """Width of the strip over the crown of a hood of three pieces; 0 for one of two."""
 
-    overlap, placket, pleat = in_metres("overlap_mm"), in_metres("placket_mm"), in_metres("pleat_mm")
-    rise, fall = in_metres("rise_mm"), in_metres("fall_mm")
-    point, strip = in_metres("point_mm"), in_metres("strip_mm")
+    overlap, placket, pleat = _in_metres("overlap_mm"), _in_metres("placket_mm"), _in_metres("pleat_mm")
+    rise, fall = _in_metres("rise_mm"), _in_metres("fall_mm")
+    point, strip = _in_metres("point_mm"), _in_metres("strip_mm")
 
     @property
     def width(self) -> float:
@@ -277,8 +282,8 @@ class PocketTable(OfKind):
     """Share of `line` on its piece that a patch or welt takes at most. On a smaller wearer its width and height, and its distances from
     line and centre line, become smaller alike."""
 
-    width, height, below = in_metres("width_mm"), in_metres("height_mm"), in_metres("below_mm")
-    from_centre, welt = in_metres("from_centre_mm"), in_metres("welt_mm")
+    width, height, below = _in_metres("width_mm"), _in_metres("height_mm"), _in_metres("below_mm")
+    from_centre, welt = _in_metres("from_centre_mm"), _in_metres("welt_mm")
 
     @model_validator(mode="after")
     def _has_its_place(self) -> PocketTable:

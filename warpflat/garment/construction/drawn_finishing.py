@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import BoolArray, FloatArray, IntArray, arc_lengths, line_name, other_side, unit
+from warpflat.core import BoolArray, FloatArray, IntArray, arc_lengths, other_side, unit
 from warpflat.flat import grid_quads, triangulate, vertex_normals
 from warpflat.garment.construction.collars import STANDS
 from warpflat.garment.mannequin.slicer import UP
-from warpflat.pattern import ViewedPiece
+from warpflat.pattern import ViewedPiece, line_name
 
 if TYPE_CHECKING:
     from warpflat.flat import Surface

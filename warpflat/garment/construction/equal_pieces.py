@@ -8,9 +8,9 @@ from itertools import islice, pairwise, product
 
 import numpy as np
 
-from warpflat.core import FloatArray, arc_lengths, line_name, points_at_lengths, resample
+from warpflat.core import FloatArray, arc_lengths, points_at_lengths, resample
 from warpflat.garment.construction.edges import SAME_LINE
-from warpflat.pattern import Pattern, Piece, Seam, SeamSide
+from warpflat.pattern import Pattern, Piece, Seam, SeamSide, line_name
 
 __all__ = ["Copy", "draw_equal_pieces_once", "drawn_sides", "run_back"]
 

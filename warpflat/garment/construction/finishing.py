@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, line_name, nearest, without_side
+from warpflat.core import FloatArray, InputError, nearest, without_side
 from warpflat.garment.construction.button_stand import buttonhole
 from warpflat.garment.construction.collars import with_collar, with_hood
 from warpflat.garment.construction.details import FinishingTable
@@ -43,7 +43,7 @@ from warpflat.garment.construction.free_edges import (
 from warpflat.garment.construction.plackets import with_placket, with_slits
 from warpflat.garment.construction.shaped_band import shortened, slant_rises, with_shaped_waistband
 from warpflat.garment.construction.strips import NARROW, Strip, panel_count
-from warpflat.pattern import CLOTH_WIDTH, Edge, Elastic, Pattern, Piece, SeamSide
+from warpflat.pattern import CLOTH_WIDTH, Edge, Elastic, Pattern, Piece, SeamSide, line_name
 
 __all__ = ["finish_edges", "hem_rises", "with_plackets"]
 

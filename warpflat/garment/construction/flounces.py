@@ -8,7 +8,7 @@ from itertools import groupby, pairwise
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, unnumbered
+from warpflat.core import FloatArray, InputError
 from warpflat.garment.construction.edges import (
     beside,
     free_piece_name,
@@ -19,7 +19,7 @@ from warpflat.garment.construction.edges import (
 from warpflat.garment.construction.facings import centre_notch
 from warpflat.garment.construction.free_edges import FreeChain, chain_allowance, chain_length
 from warpflat.garment.construction.strips import NARROW, Strip, panel_count, strip_edges, swept
-from warpflat.pattern import CLOTH_WIDTH, Edge, Pattern, Piece, SeamSide
+from warpflat.pattern import CLOTH_WIDTH, Edge, Pattern, Piece, SeamSide, unnumbered
 
 __all__ = ["with_flounce"]
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core import IntArray, expect, expect_callback, expect_each, optional_file
+from warpflat.core import IntArray, expect, expect_callback, expect_each
 from warpflat.flat import DEFAULT_FABRIC, TOUCHING, Fabric, Flattening, Progress, RelaxOptions, flatten_all
 from warpflat.garment.construction.constraints import (
     Constraint,
@@ -35,6 +35,7 @@ from warpflat.garment.construction.sewing import sew
 from warpflat.garment.construction.wearer import WearerFit, assess_wearer
 from warpflat.garment.mannequin.forms import FormResult
 from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.pattern import optional_file
 
 if TYPE_CHECKING:
     from warpflat.pattern import Body

@@ -7,15 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core import (
-    FloatArray,
-    find_unused_name,
-    other_side,
-    points_at_lengths,
-    polyline_length,
-    unnumbered,
-    without_side,
-)
+from warpflat.core import FloatArray, find_unused_name, other_side, points_at_lengths, polyline_length, without_side
 from warpflat.garment.construction.edges import (
     SAME_PIECE,
     Place,
@@ -29,7 +21,7 @@ from warpflat.garment.construction.edges import (
     runs_down,
     side_points,
 )
-from warpflat.pattern import Pattern, Seam, SeamSide, drawn_length
+from warpflat.pattern import Pattern, Seam, SeamSide, drawn_length, unnumbered
 
 __all__ = [
     "Break",

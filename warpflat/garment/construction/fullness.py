@@ -21,16 +21,16 @@ from warpflat.flat import (
     Relaxation,
     RelaxOptions,
     border_loops,
-    falloff_weights,
     given_options,
     grain_axes,
     make_stages,
-    relax_under_equations,
     springs_of,
     step_matrix,
     stretch_factor,
     with_stiffness,
 )
+from warpflat.garment.construction.augmented_lagrangian import relax_under_equations
+from warpflat.garment.construction.carry import falloff_weights
 
 __all__ = ["FullEdge", "give_fullness", "measure_fullness"]
 

@@ -10,21 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core import (
-    FloatArray,
-    IntArray,
-    arc_lengths,
-    file_in,
-    optional_file,
-    output_folder,
-    polyline_length,
-    write_report,
-)
+from warpflat.core import FloatArray, IntArray, arc_lengths, polyline_length
 from warpflat.flat import Flattening, run_metrics, separate
 from warpflat.garment.construction.edges import SAME_PIECE
 from warpflat.garment.construction.laid_as_cut import CutPattern
 from warpflat.garment.construction.mirror import even_sides, image_laid, mirror_images
 from warpflat.garment.construction.sewn import MeasuredSeam, Sewn, Stitching
+from warpflat.pattern import file_in, optional_file, output_folder, write_report
 
 if TYPE_CHECKING:
     from warpflat.garment.construction.details import FinishingTable, OpeningTable, PocketTable, SeamTable

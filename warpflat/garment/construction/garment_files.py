@@ -7,12 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from warpflat.core import optional_step
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.girths import drawn_in
 from warpflat.garment.construction.line_drawing import bands_of
 from warpflat.garment.construction.linings import add_interfacing, add_lining, add_pocketing
-from warpflat.pattern import PatternOptions, WrittenPattern, check_names, write_pattern
+from warpflat.pattern import PatternOptions, WrittenPattern, check_names, optional_step, write_pattern
 
 if TYPE_CHECKING:
     from warpflat.flat import Flattening

@@ -11,16 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core import (
-    FloatArray,
-    IntArray,
-    arc_lengths,
-    line_name,
-    other_side,
-    resample,
-    unit,
-    without_side,
-)
+from warpflat.core import FloatArray, IntArray, arc_lengths, other_side, resample, unit, without_side
 from warpflat.flat import area_vectors, border_loops, judge, triangulate, vertex_normals
 from warpflat.garment.construction.button_stand import button_depths
 from warpflat.garment.construction.drawn_finishing import Rises, finishing_views, lost_along
@@ -29,7 +20,7 @@ from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.girths import drawn_in
 from warpflat.garment.construction.mark_openings import TIE_WIDTH
 from warpflat.garment.construction.openings import place_opening
-from warpflat.pattern import ClothKind, Measure, NeededOpening, Pattern, Piece, ViewedPiece, Worn
+from warpflat.pattern import ClothKind, Measure, NeededOpening, Pattern, Piece, ViewedPiece, Worn, line_name
 
 if TYPE_CHECKING:
     from warpflat.flat import Flattening

@@ -9,8 +9,9 @@ from itertools import pairwise
 import numpy as np
 
 from warpflat.core import FloatArray, InputError, IntArray, reflected
-from warpflat.flat import SAME_PLACE, Surface, half_edges, join_labels
+from warpflat.flat import Surface, half_edges, join_labels
 from warpflat.garment.construction.edges import SAME_PIECE
+from warpflat.garment.construction.meet import SAME_PLACE
 
 __all__ = ["even_sides", "image_laid", "match_images", "mirror_images", "mirror_partners", "mirror_plane"]
 

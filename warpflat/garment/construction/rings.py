@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core import FloatArray, IntArray, find_unused_name, line_name
+from warpflat.core import FloatArray, IntArray, find_unused_name
 from warpflat.flat import chain_lines
 from warpflat.garment.mannequin.layout import ARM_LEVELS, LEG_LINES, RING_LEVELS
+from warpflat.pattern import line_name
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.forms import FormResult

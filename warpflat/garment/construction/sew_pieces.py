@@ -11,13 +11,14 @@ from typing import Literal
 import numpy as np
 
 from warpflat.core import BoolArray, InputError, IntArray, arc_lengths, find_unused_name, unit
-from warpflat.flat import SAME_PLACE, Flattening, Layer, RelaxOptions, Surface, border_loops, join_labels, lies_within
+from warpflat.flat import Flattening, Layer, RelaxOptions, Surface, border_loops, join_labels, lies_within
 from warpflat.garment.construction.border_seams import ONE_CURVE, surface_seams
 from warpflat.garment.construction.closed_cuts import seams_of_cuts
 from warpflat.garment.construction.constraints import Constraint, KeptGirth
 from warpflat.garment.construction.details import SeamTable
 from warpflat.garment.construction.fullness import FullEdge, give_fullness
 from warpflat.garment.construction.garment import Garment
+from warpflat.garment.construction.meet import SAME_PLACE
 from warpflat.garment.construction.mirror import even_sides, image_laid, mirror_images
 from warpflat.garment.construction.sewing import sew
 from warpflat.garment.construction.sewn import Sewn, Stitching

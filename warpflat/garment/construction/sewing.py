@@ -3,7 +3,7 @@
 Each edge of a seam has its partner on the other side, the same edge of the body: l_1 - r l_2 = 0, with r the wished
 ratio (1, or with ease). Constraints on borders and lines (`warpflat.garment.construction.constraints`) are equations of the same
 kind. Each equation c = 0 is held by 1/2 k (c + o)^2 with a finite stiffness k. After each round the offset o grows by the
-residual c (`warpflat.flat.solver.equations`), until all residuals are within their tolerances.
+residual c (`warpflat.garment.construction.augmented_lagrangian`), until all residuals are within their tolerances.
 
 **Costs.** The cost of a seam or a constraint, in joules, is half the work of its forces on the way from where the
 pieces lay on their own: 1/2 sum k (c + o) c_unsewn. Were the energy quadratic and the equations linear, these would add
@@ -23,24 +23,22 @@ from warpflat.core import FloatArray, InputError, IntArray, StepError, range_off
 from warpflat.flat import (
     CONTACT,
     STEPS,
-    ConstrainedOutcome,
     Flattening,
     Outcome,
     Relaxation,
     RelaxOptions,
     SpringNetwork,
     cut_sides,
-    factor_pays,
-    falloff_weights,
     given_options,
     grain_alignments,
     is_injective,
     join_surfaces,
     make_stage,
     overlap_area,
-    relax_under_equations,
     stiffness_matrix,
 )
+from warpflat.garment.construction.augmented_lagrangian import ConstrainedOutcome, factor_pays, relax_under_equations
+from warpflat.garment.construction.carry import falloff_weights
 from warpflat.garment.construction.constraint_equations import (
     ConstraintEquations,
     Correction,

@@ -8,7 +8,7 @@ from os import PathLike
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, IntArray, format_count, make_file_name, make_piece_name
+from warpflat.core import FloatArray, InputError, IntArray, format_count, make_file_name
 from warpflat.flat import (
     ALL_PRIMS,
     METRES_PER_UNIT,
@@ -25,6 +25,7 @@ from warpflat.flat import (
     triangulate,
 )
 from warpflat.garment.construction.file_seams import COUNTED, MOST_ISLANDS, file_seams
+from warpflat.garment.construction.read_pieces import make_piece_name
 
 __all__ = ["SewnPanel", "read_sewn_panels", "sewn_panels", "with_cuts"]
 

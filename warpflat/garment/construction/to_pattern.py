@@ -21,27 +21,22 @@ from warpflat.core import (
     IntArray,
     find_unused_name,
     off_line,
-    optional_step,
     polyline_length,
     quote_value,
     unit,
 )
 from warpflat.flat import (
-    SAME_PLACE,
     are_curved,
     border_loops,
     fish_eye_measure,
     grain_axes,
     join_labels,
-    open_length,
     pull_back,
-    pull_back_eye,
-    runs_without,
     seam_kind,
     separate,
 )
 from warpflat.garment.construction.closed_cuts import CLOSED, are_closed, close_cuts, seams_of_cuts
-from warpflat.garment.construction.darts import pleat_depths
+from warpflat.garment.construction.darts import open_length, pleat_depths, pull_back_eye
 from warpflat.garment.construction.ease import measure_ease
 from warpflat.garment.construction.edges import SHORT, lengths_of, with_pieces
 from warpflat.garment.construction.equal_pieces import draw_equal_pieces_once
@@ -52,6 +47,7 @@ from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.form_plan import EdgePlan, check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.construction.line_drawing import describe_worn
 from warpflat.garment.construction.mark_openings import mark_openings
+from warpflat.garment.construction.meet import SAME_PLACE
 from warpflat.garment.construction.mirror_pieces import draw_pairs_once
 from warpflat.garment.construction.openings import one_sided, place_opening
 from warpflat.garment.construction.pockets import add_pockets
@@ -74,7 +70,9 @@ from warpflat.pattern import (
     default_grain,
     joint_words,
     line_labels,
+    optional_step,
     piece_from_mesh,
+    runs_without,
 )
 
 if TYPE_CHECKING:

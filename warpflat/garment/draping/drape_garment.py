@@ -9,7 +9,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.core import BoolArray, InputError, nearest, start_warp, unnumbered, without_side
+from warpflat.core import BoolArray, InputError, nearest, start_warp, without_side
 from warpflat.flat import Flattening, Surface
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.garment import Garment
@@ -19,7 +19,7 @@ from warpflat.garment.draping.relax_drape import DrapedCloth, relax_drape
 from warpflat.garment.draping.result import Drape
 from warpflat.garment.draping.sewn_cloth import SewnCloth, pieces_of, sew_cloth
 from warpflat.garment.mannequin.mannequin import Mannequin
-from warpflat.pattern import MIRRORED
+from warpflat.pattern import MIRRORED, unnumbered
 
 __all__ = ["come_to_rest", "drape", "held_vertices", "hip_level", "thread_elastics"]
 

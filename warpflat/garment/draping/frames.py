@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import latest_file
 from warpflat.flat import corner_means
 from warpflat.garment.draping.result import Drape
 from warpflat.pattern import (
@@ -22,6 +21,7 @@ from warpflat.pattern import (
     define_mesh,
     export_stage,
     last_values_as_defaults,
+    latest_file,
     linear_rgb,
     part_path,
     set_face_map,

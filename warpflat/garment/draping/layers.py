@@ -11,8 +11,8 @@ import numpy as np
 import warp as wp
 from scipy.sparse import coo_array, csr_array
 
-from warpflat.core import FloatArray, launch_each
-from warpflat.flat import face_normals, triangulate, vertex_normals
+from warpflat.core import FloatArray, launch_each, unit
+from warpflat.flat import area_vectors, triangulate, vertex_normals
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.sewn_cloth import SewnCloth
 from warpflat.kernels.drape_layers import find_layers
@@ -76,7 +76,7 @@ class Layers:
         launch_each(find_layers, count, inputs, [found, share], device=device, least=64)
         face, self._share = found.numpy().copy(), share.numpy().copy()
         self.corner = np.where(face[:, None] < 0, self._vertex[:, None], surface.triangles[face])
-        normal = face_normals(positions, surface.triangles)[face]
+        normal = unit(area_vectors(positions, surface.triangles))[face]
         height = np.einsum("ki,ki->k", self._off(positions), normal)
         side = np.where(height < 0.0, -1.0, 1.0)
         # What lay before a vertex may now lie behind it.

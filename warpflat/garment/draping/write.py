@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from warpflat.core import file_in, latest_file, optional_file, output_folder
 from warpflat.garment.draping.frames import write_drape_frames
 from warpflat.garment.draping.picture import write_drape_film, write_drape_picture
 from warpflat.garment.draping.result import Drape
 from warpflat.garment.draping.sewn_cloth import worn_surface
-from warpflat.pattern import write_obj, write_sewn_usd
+from warpflat.pattern import file_in, latest_file, optional_file, output_folder, write_obj, write_sewn_usd
 
 __all__ = ["files_of_drape", "save_drape", "write_drape_files"]
 
@@ -45,7 +44,7 @@ def save_drape(
 def write_drape_files(
     drape: Drape, folder: Path, *, picture: bool = True, frames: bool = False, usd: bool = False
 ) -> list[str]:
-    """Write the files into a folder in a block of :func:`warpflat.core.output.output_folder`.
+    """Write the files into a folder in a block of :func:`warpflat.pattern.files.output.output_folder`.
 
     Returns:
         Their names, without those of pictures and film that had to be left out.

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core import IntArray, unnumbered
+from warpflat.core import IntArray
 from warpflat.garment.mannequin.pieces import FormPiece
 from warpflat.garment.mannequin.seam_names import name_seams
+from warpflat.pattern import unnumbered
 
 __all__ = ["FormSeam", "SeamRun", "find_seams"]
 

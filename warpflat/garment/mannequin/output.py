@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpflat._version import __version__
-from warpflat.core import atomic_path, optional_file, output_folder, write_report
 from warpflat.garment.mannequin.picture import write_distance_picture, write_mannequin_picture
 from warpflat.garment.mannequin.usd import write_mannequin_usd
+from warpflat.pattern import atomic_path, optional_file, output_folder, write_report
 
 if TYPE_CHECKING:
     from warpflat.garment.mannequin.mannequin import Mannequin

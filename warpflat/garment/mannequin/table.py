@@ -9,11 +9,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from warpflat.core import MADE_TO_MEASURE, InputError, Table, listening_to_reads
+from warpflat.core import InputError, Table, listening_to_reads
 from warpflat.flat import read_scan
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.measurements import size_table
 from warpflat.garment.mannequin.scan_pose import ScanOptions
+from warpflat.pattern import MADE_TO_MEASURE
 
 __all__ = ["MannequinTable", "mannequin_from_scan_file", "mannequin_from_table"]
 

@@ -15,19 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from warpflat.core import FloatArray, InputError, arc_lengths, points_at_lengths, project_on_segments, quote_value, unit
-from warpflat.flat import (
-    SAME_PLACE,
-    Surface,
-    SurfacePath,
-    are_joined,
-    geodesic_path,
-    locate,
-    plane_sections,
-    polyline_path,
-)
+from warpflat.flat import Surface, SurfacePath, are_joined, geodesic_path, locate, polyline_path
+from warpflat.garment.construction.meet import SAME_PLACE
 from warpflat.garment.seams.anatomy import FROM_SHOULDERS, TAILORED, Anatomy
 from warpflat.garment.seams.cloth import ISLAND, LEVELS, Cloth, are_among, edge_components, section
 from warpflat.garment.seams.options import SeamCut, SeamOptions, in_family
+from warpflat.garment.seams.section import plane_sections
 from warpflat.garment.seams.tailor import BESIDE, LEFT, centre_lines
 
 __all__ = ["HAND", "cut_by_hand", "join_ends", "keep_seams", "leave_to_hand", "level_of", "plane_curves"]

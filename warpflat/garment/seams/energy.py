@@ -13,13 +13,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core import (
-    InputError,
-    find_unused_name,
-    other_side,
-    report_activity,
-    two_at_a_time,
-)
+from warpflat.core import InputError, find_unused_name, other_side, report_activity
 from warpflat.flat import LEAST_MOUTH, TRIED, Fabric, Flattening, Surface
 from warpflat.garment.seams.anatomy import Anatomy
 from warpflat.garment.seams.cloth import ALIKE, Cloth, PieceMesh, edge_components
@@ -38,6 +32,7 @@ from warpflat.garment.seams.measure import (
 from warpflat.garment.seams.options import SeamOptions
 from warpflat.garment.seams.solid import NARROW, OVERLAP, SEWABLE, SOLID, parts_within
 from warpflat.garment.seams.tailor import side_word
+from warpflat.pattern import two_at_a_time
 
 __all__ = ["Trial", "cut_by_energy"]
 

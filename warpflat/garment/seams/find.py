@@ -30,7 +30,6 @@ from warpflat.flat import (
     line_from_curve,
     line_on_plane,
     load_library,
-    plane_sections,
     triangulate,
 )
 from warpflat.garment.seams.anatomy import (
@@ -50,6 +49,7 @@ from warpflat.garment.seams.energy import Trial, cut_by_energy
 from warpflat.garment.seams.measure import laid_flat
 from warpflat.garment.seams.openings import open_tubes
 from warpflat.garment.seams.options import NO_PATTERN, SeamOptions
+from warpflat.garment.seams.section import plane_sections
 from warpflat.garment.seams.solid import LaidFlat, is_panel, part_solids, parts_within
 from warpflat.garment.seams.symmetric import averaged, mirrored
 from warpflat.garment.seams.tailor import FACING, cut_as_a_tailor, draw_fields, side_word, with_drawn_sleeves

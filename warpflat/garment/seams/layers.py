@@ -18,7 +18,6 @@ from warpflat.core import (
     find_unused_name,
     format_count,
     make_file_name,
-    make_piece_name,
     plain_label,
     quote_value,
 )
@@ -37,12 +36,13 @@ from warpflat.flat import (
     make_surface,
     parts_of_faces,
     read_mesh_file,
-    surplus_faces,
     surplus_layers,
     weld_map,
     wrong_size,
 )
 from warpflat.garment.construction.file_seams import FileSeams
+from warpflat.garment.construction.overlapping_layers import surplus_faces
+from warpflat.garment.construction.read_pieces import make_piece_name
 from warpflat.garment.seams.options import SeamCut
 
 if TYPE_CHECKING:

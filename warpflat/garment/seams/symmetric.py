@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from warpflat.core import FloatArray, other_side, project_on_segments
-from warpflat.flat import SAME_PLACE
+from warpflat.garment.construction.meet import SAME_PLACE
 from warpflat.garment.seams.anatomy import Anatomy
 from warpflat.garment.seams.cloth import ALIKE, BESIDE_LINE, FACES, LEVELS, Cloth, PieceMesh, are_among, edge_components
 from warpflat.garment.seams.tailor import LEFT

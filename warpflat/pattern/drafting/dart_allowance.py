@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, dart_words, points_at_lengths, unit
+from warpflat.core import FloatArray, InputError, points_at_lengths, unit
 from warpflat.pattern.drafting.hem_allowance import HEM_SLANT
+from warpflat.pattern.drafting.names import dart_words
 from warpflat.pattern.drafting.polygons import (
     GRID,
     angle_between,

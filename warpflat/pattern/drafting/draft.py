@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, dart_words, optional_step, polyline_length
+from warpflat.core import FloatArray, InputError, polyline_length
 from warpflat.pattern.drafting.allowance import cut_hole, cut_outline
 from warpflat.pattern.drafting.curves import TOLERANCE, Curve
 from warpflat.pattern.drafting.drafted import (
@@ -37,6 +37,7 @@ from warpflat.pattern.drafting.fitting import (
 )
 from warpflat.pattern.drafting.label import Label
 from warpflat.pattern.drafting.measures import length_words
+from warpflat.pattern.drafting.names import dart_words
 from warpflat.pattern.drafting.notches import cut_darts, dart_notches, seam_notches, seam_reports
 from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam
 from warpflat.pattern.drafting.placement import default_grain, place_label
@@ -45,6 +46,7 @@ from warpflat.pattern.drafting.seam_difference import SEAM_TOLERANCE
 from warpflat.pattern.drafting.sides import Side, Wedge
 from warpflat.pattern.drafting.truing import CornerReport, true_corners
 from warpflat.pattern.drafting.words import printed_in
+from warpflat.pattern.files.output import optional_step
 
 __all__ = ["draft_garment", "draft_half", "nest_label", "relabelled"]
 

@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, dart_words, resample
+from warpflat.core import FloatArray, resample
 from warpflat.flat import are_curved
 from warpflat.pattern.drafting.curves import TOLERANCE, farthest, fit_curve
 from warpflat.pattern.drafting.dart_allowance import WIDEST_DART
 from warpflat.pattern.drafting.drafted import DraftedDart, DraftedEdge, drawn_leg
 from warpflat.pattern.drafting.measures import length_words
+from warpflat.pattern.drafting.names import dart_words
 from warpflat.pattern.drafting.piece_parts import DEFAULT_ALLOWANCE, SAME_POINT, Dart
 from warpflat.pattern.drafting.pieces import Piece
 from warpflat.pattern.drafting.seam_difference import SEAM_TOLERANCE

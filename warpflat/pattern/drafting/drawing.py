@@ -9,22 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core import (
-    FloatArray,
-    arc_lengths,
-    name_without_number,
-    points_at_lengths,
-    polyline_length,
-    resample,
-    unit,
-    without_side,
-)
+from warpflat.core import FloatArray, arc_lengths, points_at_lengths, polyline_length, resample, unit, without_side
 from warpflat.pattern.drafting.curves import Curve, fit_curve
 from warpflat.pattern.drafting.draft import nest_label
 from warpflat.pattern.drafting.drafted import DraftedEdge, DraftedPiece
 from warpflat.pattern.drafting.drafted_darts import fisheye_legs
 from warpflat.pattern.drafting.label import TAILS, Label, Words, text_width
 from warpflat.pattern.drafting.measures import name_in_units
+from warpflat.pattern.drafting.names import name_without_number
 from warpflat.pattern.drafting.piece_parts import HEMMED_LEVELS, LEFT_OUT
 from warpflat.pattern.drafting.placement import LabelRoom, Spot, as_read, spots_along
 from warpflat.pattern.drafting.polygons import parallelogram

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from warpflat.core import FloatArray, line_name, polyline_length, unit, without_side
+from warpflat.core import FloatArray, polyline_length, unit, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
+from warpflat.pattern.drafting.names import line_name
 from warpflat.pattern.drafting.sewing_tasks import is_flounce
 from warpflat.pattern.drafting.shrinkage import as_worn
 from warpflat.pattern.drafting.words import translate, translate_name

@@ -9,16 +9,19 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.core import FloatArray, InputError, IntArray, nearest, optional_step
-from warpflat.flat import MEET, border_loops, parted, runs_without
+from warpflat.core import FloatArray, InputError, IntArray, nearest
+from warpflat.flat import OVERLAP, border_loops
 from warpflat.pattern.drafting.corners import find_corners, find_cracks
 from warpflat.pattern.drafting.piece_parts import LEFT_OUT, SAME_POINT, Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import Piece, check_hole
 from warpflat.pattern.drafting.placement import default_grain
 from warpflat.pattern.drafting.polygons import signed_area, upright
+from warpflat.pattern.files.output import optional_step
 
-__all__ = ["MeshFeatures", "line_labels", "piece_from_mesh"]
+__all__ = ["MEET", "MeshFeatures", "line_labels", "piece_from_mesh", "runs_without"]
 
+#: Borders that run along each other within this distance [m] are meant to meet.
+MEET = 1e-3
 
 #: Places in a border of a dart's left mouth, tip and right mouth, in counter-clockwise order.
 DartPlaces = tuple[int, int, int]
@@ -94,7 +97,7 @@ def piece_from_mesh(
     outer, inner = loops[largest], [loop for i, loop in enumerate(loops) if i != largest]
     # A hole that meets the border at a point opens there.
     flat = flat.copy()
-    flat[outer] = parted(flat[outer])
+    flat[outer] = _parted(flat[outer])
     corners, darts = _find_darts(flat, outer, features, where)
     stretches = _split_border(outer, line_labels(outer, lines), corners, darts, features.ends)
     names = [title for title, _ in stretches]
@@ -222,3 +225,45 @@ def line_labels(loop: IntArray, curves: Mapping[str, IntArray]) -> list[str]:
             label.setdefault((min(a, b), max(a, b)), key)
     around = [*loop.tolist(), int(loop[0])]
     return [label.get((min(a, b), max(a, b)), "") for a, b in pairwise(around)]
+
+
+def runs_without(path: IntArray, edges: Collection[tuple[int, ...]]) -> list[IntArray]:
+    """Return the runs of a path, as vertex indices, between the edges of it that are among `edges`, each as (lower, higher) vertex."""
+    runs: list[list[int]] = [[]]
+    for a, b in pairwise(path.tolist()):
+        if (min(a, b), max(a, b)) in edges:
+            runs.append([])
+        else:
+            runs[-1] += [b] if runs[-1] else [a, b]
+    return [np.array(run, dtype=np.int32) for run in runs if run]
+
+
+def _parted(ring: FloatArray) -> FloatArray:
+    """Return an outline that touches itself, or lies over itself by rounding, with these places moved apart; any other one as it is.
+
+    Around a hole that meets the border at a point, and where two borders run along each other, points move into the cloth, by a share of
+    `OVERLAP`.
+
+    Args:
+        ring: #P by 2 [m], closed, the first point not repeated, counter-clockwise.
+    """
+    import shapely
+
+    if len(ring) < 4 or shapely.Polygon(ring).is_valid:
+        return ring
+    ahead = np.roll(ring, -1, axis=0)
+    sides = shapely.linestrings(np.stack([ring, ahead], axis=1))
+    point, side = shapely.STRtree(sides).query(shapely.points(ring), predicate="dwithin", distance=OVERLAP)
+    # What lies near along the outline is no other part of it.
+    lengths = np.linalg.norm(ahead - ring, axis=1)
+    at, around = np.cumsum(lengths) - lengths, float(lengths.sum())
+    between = np.minimum(np.abs(at[point] - at[side]), np.abs(at[point] - at[side] - lengths[side]))
+    touching = np.unique(point[np.minimum(between, around - between - lengths[side]) > 4.0 * OVERLAP])
+    way = np.roll(ring, -1, axis=0) - np.roll(ring, 1, axis=0)
+    inward = np.column_stack([-way[:, 1], way[:, 0]]) / np.maximum(np.linalg.norm(way, axis=1), 1e-300)[:, None]
+    for share in (0.05, 0.1, 0.2, 0.4):
+        moved = ring.copy()
+        moved[touching] += share * OVERLAP * inward[touching]
+        if shapely.Polygon(moved).is_valid:
+            return moved
+    return ring

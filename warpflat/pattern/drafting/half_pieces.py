@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core import FloatArray, arc_lengths, find_unused_name, optional_step, without_side
+from warpflat.core import FloatArray, arc_lengths, find_unused_name, without_side
 from warpflat.pattern.drafting.curves import Curve, chords, farthest, split_bezier
 from warpflat.pattern.drafting.draft import draft_half
 from warpflat.pattern.drafting.drafted import DraftedEdge, DraftedGarment, DraftedPiece, Notch
@@ -15,6 +15,7 @@ from warpflat.pattern.drafting.piece_parts import SAME_POINT, Edge, Hole
 from warpflat.pattern.drafting.pieces import Seam
 from warpflat.pattern.drafting.seam_difference import SEAM_TOLERANCE
 from warpflat.pattern.drafting.shrinkage import as_worn, resized
+from warpflat.pattern.files.output import optional_step
 
 __all__ = ["halved", "is_symmetric"]
 

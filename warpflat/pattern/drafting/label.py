@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, size_words
+from warpflat.core import FloatArray
 from warpflat.pattern.drafting.measures import length_words
+from warpflat.pattern.drafting.names import size_words
 from warpflat.pattern.drafting.pieces import Piece
 from warpflat.pattern.drafting.polygons import rotation
 from warpflat.pattern.drafting.words import as_sentence, translate

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, nearest, size_words, thread_count
+from warpflat.core import FloatArray, InputError, nearest, thread_count
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.label import Label, printed_size
 from warpflat.pattern.drafting.matched_lay import Stripes
+from warpflat.pattern.drafting.names import size_words
 from warpflat.pattern.drafting.pieces import unknown_size
 from warpflat.pattern.drafting.placement import fit_label
 from warpflat.pattern.drafting.polygons import mapped, mirror_image, outer_ring, rotation

@@ -9,9 +9,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, check_label, nearest, off_line, short_repr, size_words, without_side
+from warpflat.core import FloatArray, InputError, check_label, nearest, off_line, short_repr, without_side
 from warpflat.flat import OVERLAP, overlap_width, overlapping
 from warpflat.pattern.drafting.measures import UNITS
+from warpflat.pattern.drafting.names import size_words
 from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT, SAME_POINT, Dart, Edge, FoundSeam, Hole, check_points
 from warpflat.pattern.drafting.seam_difference import eased_length
 from warpflat.pattern.drafting.words import translate_name

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from warpflat.core import InputError, unnumbered
+from warpflat.core import InputError
+from warpflat.pattern.drafting.names import unnumbered
 from warpflat.pattern.drafting.pieces import Seam, SeamSide
 
 __all__ = ["joint_words", "seam_words", "seams_of_words"]

@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core import other_side, turn_between, unnumbered, without_side
+from warpflat.core import other_side, turn_between, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.measures import length_words
+from warpflat.pattern.drafting.names import unnumbered
 from warpflat.pattern.drafting.pieces import Seam, SeamOpening, SeamSide
 from warpflat.pattern.drafting.polygons import signed_area
 from warpflat.pattern.drafting.seam_words import joint_words

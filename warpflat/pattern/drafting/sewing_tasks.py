@@ -9,9 +9,10 @@ from dataclasses import dataclass, field, replace
 from importlib import resources
 from typing import Any
 
-from warpflat.core import line_name, other_side, polyline_length, read_toml, without_side
+from warpflat.core import other_side, polyline_length, read_toml, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.measures import length_words
+from warpflat.pattern.drafting.names import line_name
 from warpflat.pattern.drafting.pieces import Elastic, Piece, Seam, SeamSide
 from warpflat.pattern.drafting.words import listed, translate, translate_name
 

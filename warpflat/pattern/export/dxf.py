@@ -20,13 +20,10 @@ from warpflat.core import (
     BoolArray,
     FloatArray,
     InputError,
-    atomic_path,
     control_in,
     find_unused_name,
     nearest,
-    plain_letters,
     resample,
-    source_date,
     turning_angles,
 )
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
@@ -34,7 +31,9 @@ from warpflat.pattern.drafting.label import text_width
 from warpflat.pattern.drafting.layout import lay_out, nests
 from warpflat.pattern.drafting.measures import INCH
 from warpflat.pattern.drafting.seam_words import seam_words
-from warpflat.pattern.export.letters import titles
+from warpflat.pattern.export.letters import plain_letters, titles
+from warpflat.pattern.files.output import atomic_path
+from warpflat.pattern.files.source_date import source_date
 
 __all__ = ["block_name", "write_dxf"]
 

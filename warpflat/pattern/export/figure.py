@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from warpflat.core import FloatArray, atomic_path, report_activity
+from warpflat.core import FloatArray, report_activity
 from warpflat.pattern.export.colours import Scale
 from warpflat.pattern.export.letters import all_letters
+from warpflat.pattern.files.output import atomic_path
 
 __all__ = [
     "DPI",

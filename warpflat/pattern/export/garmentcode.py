@@ -12,13 +12,14 @@ import numpy as np
 from pydantic_core import to_json
 from scipy.spatial.transform import Rotation
 
-from warpflat.core import FloatArray, arc_lengths, atomic_path, points_at_lengths, turning_angles
+from warpflat.core import FloatArray, arc_lengths, points_at_lengths, turning_angles
 from warpflat.pattern.drafting.curves import CHORD, TOLERANCE, cubic_weights
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.fitting import EdgeKey
 from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.drafting.whole_pieces import whole_pieces
 from warpflat.pattern.export.read_garmentcode import CENTIMETRES, LABELS
+from warpflat.pattern.files.output import atomic_path
 
 __all__ = ["garmentcode_json", "write_garmentcode"]
 

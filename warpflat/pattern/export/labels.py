@@ -12,7 +12,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from warpflat.core import BoolArray, FloatArray, name_without_number, polyline_length, resample
+from warpflat.core import BoolArray, FloatArray, polyline_length, resample
+from warpflat.pattern.drafting.names import name_without_number
 from warpflat.pattern.drafting.placement import (
     LabelRoom,
     Spot,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import functools
+import unicodedata
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
-__all__ = ["all_letters", "is_drawn", "note_on_names", "titles"]
+__all__ = ["all_letters", "is_drawn", "note_on_names", "plain_letters", "titles"]
 
 # Fonts that come with common systems; matplotlib's own font knows Latin, Greek, Cyrillic, Arabic, Hebrew and some more.
 _FONTS_OF_OTHER_SCRIPTS = (
@@ -16,6 +17,12 @@ _FONTS_OF_OTHER_SCRIPTS = (
     "MS Gothic", "Malgun Gothic", "Nirmala UI", "Leelawadee UI", "PingFang SC", "Hiragino Sans GB", "Hiragino Sans",
     "Apple SD Gothic Neo", "Arial Unicode MS", "Nanum Gothic", "NanumGothic", "Unifont",
 )  # fmt: skip
+
+#: Letters that are no letter with an accent.
+_LETTERS = str.maketrans(
+    {"ß": "ss", "æ": "ae", "Æ": "Ae", "œ": "oe", "Œ": "Oe", "ø": "o", "Ø": "O", "ł": "l", "Ł": "L", "đ": "d", "Đ": "D"}
+    | {"ð": "d", "Ð": "D", "þ": "th", "Þ": "Th", "ı": "i"}
+)
 
 
 @contextmanager
@@ -65,3 +72,9 @@ def _known(families: tuple[str, ...]) -> frozenset[int]:
 
     files = [findfont(FontProperties(family=[family])) for family in families]
     return frozenset().union(*(get_font(file).get_charmap() for file in files))
+
+
+def plain_letters(text: str) -> str:
+    """Return a text without the accents of its letters: "Ärmel" becomes "Armel"."""
+    apart = unicodedata.normalize("NFKD", text.translate(_LETTERS))
+    return "".join(letter for letter in apart if not unicodedata.combining(letter))

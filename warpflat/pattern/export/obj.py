@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic_core import to_json
 
-from warpflat.core import FloatArray, atomic_path
+from warpflat.core import FloatArray
 from warpflat.flat import Surface
+from warpflat.pattern.files.output import atomic_path
 
 __all__ = ["write_obj"]
 

@@ -11,26 +11,20 @@ from typing import TYPE_CHECKING, Any
 from warpflat._version import __version__
 from warpflat.core import (
     InputError,
-    LeftOut,
-    file_in,
     foreign_words,
     format_count,
     is_number,
-    listening_to_left_out,
     make_file_name,
     nearest,
-    optional_step,
     other_kind_words,
-    output_folder,
-    plain_letters,
-    record_file,
     report_activity,
     same_file,
-    write_json,
-    write_report,
 )
 from warpflat.pattern.drafting.edge_rules import EdgeRules
 from warpflat.pattern.drafting.shrinkage import Shrinkage, enlarged
+from warpflat.pattern.export.letters import plain_letters
+from warpflat.pattern.files.left_out import LeftOut, listening_to_left_out
+from warpflat.pattern.files.output import file_in, optional_step, output_folder, record_file, write_json, write_report
 
 if TYPE_CHECKING:
     from warpflat.pattern.drafting.drafted import DraftedGarment
@@ -254,7 +248,7 @@ def _check_formats(formats: Iterable[str]) -> None:
 def write_pattern(
     make: Callable[[], tuple[Pattern, tuple[str, ...]]], to: str | Path, *, name: str, options: PatternOptions
 ) -> WrittenPattern:
-    """Make, draft and write a pattern; what cannot be drawn or written of it is left out (:func:`warpflat.core.output.optional_step`).
+    """Make, draft and write a pattern; what cannot be drawn or written is left out (:func:`warpflat.pattern.files.output.optional_step`).
 
     A pattern that cannot be drawn becomes a note, not an error: by then the garment has been flattened and its other
     files are good.

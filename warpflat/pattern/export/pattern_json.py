@@ -24,7 +24,6 @@ from warpflat.core import (
     FloatArray,
     InputError,
     Table,
-    atomic_path,
     check_label,
     check_table,
     control_in,
@@ -47,6 +46,7 @@ from warpflat.pattern.drafting.measures import Units
 from warpflat.pattern.drafting.piece_parts import MOST_ALLOWANCE, Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import OpeningKind, Pattern, Piece, Role, Seam, SeamSide
 from warpflat.pattern.drafting.polygons import signed_area
+from warpflat.pattern.files.output import atomic_path
 
 __all__ = [
     "SCHEMA",

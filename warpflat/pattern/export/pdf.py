@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core import FloatArray, InputError, atomic_path, nearest, optional_file
+from warpflat.core import FloatArray, InputError, nearest
 from warpflat.pattern.drafting.draft import nest_label, relabelled
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.drawing import Drawing, OnPaper, Stroke, draw_nest
@@ -32,6 +32,7 @@ from warpflat.pattern.export.pdf_legend import draw_legend, legend_page
 from warpflat.pattern.export.pdf_pen import POINT, draw_line, draw_words, page_footer
 from warpflat.pattern.export.pdf_tiling import LEGEND_SIZE, SIZE_DASHES, Paper, Tiling, make_tiling
 from warpflat.pattern.export.svg import OF_SIZE, SIZE_COLOURS, STYLE
+from warpflat.pattern.files.output import atomic_path, optional_file
 
 __all__ = ["PAPERS", "draw_sheet", "sheet_names", "too_many_sheets", "write_pdf"]
 

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpflat.core import energy_words, file_in, optional_file, output_folder, write_report
+from warpflat.core import energy_words
 from warpflat.flat import Flattening, worn_strain
 from warpflat.pattern.export.obj import write_obj
+from warpflat.pattern.files.output import file_in, optional_file, output_folder, write_report
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -103,7 +104,7 @@ def write_pieces(
 
     Args:
         pieces: of different names.
-        folder: an existing one, in a block of :func:`warpflat.core.output.output_folder`.
+        folder: an existing one, in a block of :func:`warpflat.pattern.files.output.output_folder`.
         picture: whether to draw one.
         frames: whether to write a USD file with the development and the pattern.
         body: on which the picture shows them first; none if not given.

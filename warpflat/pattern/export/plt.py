@@ -11,11 +11,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from warpflat.core import atomic_path, plain_letters
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.drawing import draw_nest
 from warpflat.pattern.drafting.layout import lay_out, nests
 from warpflat.pattern.drafting.words import printed_in
+from warpflat.pattern.export.letters import plain_letters
+from warpflat.pattern.files.output import atomic_path
 
 __all__ = ["PENS", "UNITS_IN_METRE", "write_plt"]
 

@@ -9,15 +9,17 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from warpflat.core import FloatArray, atomic_path, control_in, find_unused_name, format_count, size_words
+from warpflat.core import FloatArray, control_in, find_unused_name, format_count
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.drawing import Drawing, Stroke, draw_nest, grain_strokes
 from warpflat.pattern.drafting.label import CAPITALS, LEADING, Words, text_width
 from warpflat.pattern.drafting.layout import lay_out, nests
 from warpflat.pattern.drafting.marker import Copy, Marker
+from warpflat.pattern.drafting.names import size_words
 from warpflat.pattern.drafting.polygons import mapped
 from warpflat.pattern.drafting.seam_words import seam_words
 from warpflat.pattern.drafting.words import printed_in
+from warpflat.pattern.files.output import atomic_path
 
 __all__ = ["OF_SIZE", "SIZE_COLOURS", "STYLE", "SvgPage", "write_marker_svg", "write_overlay_svg", "write_svg"]
 

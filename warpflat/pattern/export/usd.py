@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpflat._version import __version__
-from warpflat.core import FloatArray, InputError, atomic_path
+from warpflat.core import FloatArray, InputError
 from warpflat.flat import Surface, triangulate, vertex_normals
 from warpflat.pattern.export.colours import VertexColours, energy_scale
 from warpflat.pattern.export.geometry import Polylines, face_areas, polylines_of
@@ -41,6 +41,7 @@ from warpflat.pattern.export.usd_prims import (
     usd_errors,
     valid_name,
 )
+from warpflat.pattern.files.output import atomic_path
 
 __all__ = ["DRAFTED", "FrameWriter", "film_scale"]
 

@@ -17,9 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpflat.core import CannotWriteError, FloatArray, IntArray, atomic_path, find_unused_name
+from warpflat.core import CannotWriteError, FloatArray, IntArray, find_unused_name
 from warpflat.flat import Surface
 from warpflat.pattern.export.geometry import Polylines
+from warpflat.pattern.files.output import atomic_path
 
 __all__ = [
     "FIRST_FRAME",

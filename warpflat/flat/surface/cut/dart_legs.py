@@ -7,7 +7,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 
-__all__ = ["are_curved", "check_tip_back", "open_length", "pull_back", "pull_back_eye"]
+__all__ = ["are_curved", "check_tip_back", "pull_back"]
 
 
 #: Legs are straight if they stray from their chord by no more than this [m], or this share of its length.
@@ -23,20 +23,6 @@ def are_curved(*legs: FloatArray) -> bool:
         if shapely.distance(chord, shapely.points(leg)).max() > max(STRAIGHT, STRAIGHT_SHARE * chord.length):
             return True
     return False
-
-
-def open_length(left: FloatArray, right: FloatArray) -> tuple[int, float]:
-    """Return how many of their points, from the border, two matched legs are open, and how far they overlap after that [m].
-
-    Args:
-        left, right: #P by 2 [m], from the border to the tip, which they share; the wedge lies on the right of the left leg.
-    """
-    middle = 0.5 * (left + right)
-    along = np.gradient(middle, axis=0)
-    across = right - left
-    gap = (along[:, 1] * across[:, 0] - along[:, 0] * across[:, 1]) / np.maximum(np.linalg.norm(along, axis=1), 1e-12)
-    closed = np.flatnonzero(gap[:-1] <= 0.0)
-    return (int(closed[0]) if len(closed) else len(left)), float(max(0.0, -gap[:-1].min()))
 
 
 def check_tip_back(tip_back: float, room: float, of: str = "dart's length") -> None:
@@ -76,35 +62,6 @@ def pull_back(left: FloatArray, right: FloatArray, tip_back: float) -> tuple[Flo
     along = along if along @ (to_left + to_right) > 0 else -along
     moved = tip + offset * normal + float(np.sqrt(tip_back**2 - offset**2)) * along
     return _ending_at(left, moved), _ending_at(right, moved)
-
-
-def pull_back_eye(left: FloatArray, right: FloatArray, station: int, tip_back: float) -> tuple[FloatArray, FloatArray]:
-    """Return both sides of a fish-eye dart with their tips moved towards each other, as wide as before.
-
-    Args:
-        left, right: #P by 2 [m], matched, from the first tip to the last one.
-        station: the index of the widest points, which stay.
-        tip_back: of either tip [m].
-
-    Raises:
-        InputError: `tip_back` is negative or leaves no dart.
-    """
-    first, span = left[0], left[-1] - left[0]
-    length = float(np.linalg.norm(span))
-    axis = span / length
-    widest = float((0.5 * (left[station] + right[station]) - first) @ axis)
-    check_tip_back(tip_back, min(widest, length - widest), "shorter half")
-
-    def shortened(side: FloatArray) -> FloatArray:
-        reach = (side - first) @ axis
-        short = np.where(
-            reach < widest,
-            widest - (widest - reach) * (1 - tip_back / widest),
-            widest + (reach - widest) * (1 - tip_back / (length - widest)),
-        )
-        return side + np.multiply.outer(short - reach, axis)
-
-    return shortened(left), shortened(right)
 
 
 def _ending_at(leg: FloatArray, tip: FloatArray) -> FloatArray:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from itertools import pairwise
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +17,7 @@ from warpflat.flat.surface.mesh import Surface, once_per_surface
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-__all__ = ["EdgeGraph", "are_joined", "as_vertex", "path_length", "runs_without"]
+__all__ = ["EdgeGraph", "are_joined", "as_vertex", "path_length"]
 
 # A point given by coordinates must lie this close to the piece: as a share of its diagonal, or in edge lengths.
 _NEAR_SHARE = 0.1
@@ -33,17 +32,6 @@ def are_joined(edges: IntArray, a: ArrayLike, b: ArrayLike) -> BoolArray:
     for k in range(int((last - first).max(initial=0))):
         joined |= (first + k < last) & (edges[np.minimum(first + k, len(edges) - 1), 1] == high)
     return joined
-
-
-def runs_without(path: IntArray, edges: Collection[tuple[int, ...]]) -> list[IntArray]:
-    """Return the runs of a path, as vertex indices, between the edges of it that are among `edges`, each as (lower, higher) vertex."""
-    runs: list[list[int]] = [[]]
-    for a, b in pairwise(path.tolist()):
-        if (min(a, b), max(a, b)) in edges:
-            runs.append([])
-        else:
-            runs[-1] += [b] if runs[-1] else [a, b]
-    return [np.array(run, dtype=np.int32) for run in runs if run]
 
 
 class EdgeGraph:

@@ -3,44 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
-from warpflat.core.errors import InputError
 from warpflat.core.text import area_words, format_count
 from warpflat.flat.surface.closest import nearest_on_triangles
-from warpflat.flat.surface.connectivity import orient
-from warpflat.flat.surface.half_edges import half_edges
 from warpflat.flat.surface.normals import flat_areas
-from warpflat.flat.surface.repair.polygons import distinct_corners, split_polygons
-from warpflat.flat.surface.repair.sheets import inner_sheets, outer_sheet
+from warpflat.flat.surface.repair.sheets import inner_sheets
 from warpflat.flat.surface.triangles import triangulate
 
 __all__ = [
-    "SAME_LAYER",
     "Layer",
-    "covered_faces",
     "doubled_layers",
     "lies_within",
-    "overlap_notes",
     "surplus_layers",
 ]
 
-#: Layers nowhere further apart than this [m] are one: thinner than any cloth.
-SAME_LAYER = 5e-5
+# Layers nowhere further apart than this [m] are one: thinner than any cloth.
+_SAME_LAYER = 5e-5
 # Areas of one layer in two meshes agree within this share.
 _SAME_AREA = 0.02
 # Triangles that are tried as the nearest to a point, by their middles.
 _TRIED = 24
-# Layers that lie on each other over more than this [m2] are told. So many parts of a mesh, the largest, are compared.
-_OVERLAP, _MOST_PARTS = 1e-4, 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +64,8 @@ class Layer:
         reach = float(np.linalg.norm(corners - middles[:, None], axis=2).max(initial=0.0))
         return corners, cKDTree(middles), reach
 
-    def is_at(self, points: FloatArray, distance: float) -> BoolArray:
-        """Return which points (#P by 3 [m]) lie within a distance [m] of it; some that do may count as further off."""
+    def is_at(self, points: FloatArray, distance: float = _SAME_LAYER) -> BoolArray:
+        """Return which points (#P by 3 [m]) lie within a distance [m] of it, else on it; some that do may count as further off."""
         found = (
             (points >= self.vertices.min(axis=0) - distance) & (points <= self.vertices.max(axis=0) + distance)
         ).all(axis=1)
@@ -142,7 +130,7 @@ def doubled_layers(layers: Sequence[Layer]) -> dict[int, int]:
     lower, upper = (np.array([bound(layer.vertices, axis=0) for layer in layers]) for bound in (np.min, np.max))
     doubled: dict[int, int] = {}
     for number, layer in enumerate(layers):
-        inside = (lower[number] >= lower - SAME_LAYER) & (upper[number] <= upper + SAME_LAYER)
+        inside = (lower[number] >= lower - _SAME_LAYER) & (upper[number] <= upper + _SAME_LAYER)
         for other in np.flatnonzero(inside.all(axis=1)).tolist():
             if other == number or other in doubled:
                 continue
@@ -151,8 +139,8 @@ def doubled_layers(layers: Sequence[Layer]) -> dict[int, int]:
             if ((other < number or fewer) and _has_faces(whole, layer)) or (
                 other < number
                 and abs(whole.area - layer.area) <= _SAME_AREA * max(whole.area, layer.area)
-                and lies_within(whole, layer, SAME_LAYER)
-                and lies_within(layer, whole, SAME_LAYER)
+                and lies_within(whole, layer, _SAME_LAYER)
+                and lies_within(layer, whole, _SAME_LAYER)
             ):
                 doubled[number] = other
                 break
@@ -166,84 +154,8 @@ def lies_within(layer: Layer, other: Layer, distance: float) -> bool:
     return bool(other.is_at(layer.vertices, distance).all())
 
 
-def covered_faces(layer: Layer, other: Layer) -> BoolArray:
-    """Return #F, which faces of a layer lie on another one: their corners and their middles do."""
-    corners = np.where(layer.faces >= 0, layer.faces, layer.faces[:, :1])
-    covered: BoolArray = np.all(other.is_at(layer.vertices, SAME_LAYER)[corners], axis=1)
-    rows = np.flatnonzero(covered)
-    middles = layer.vertices[layer.faces[rows, :3]].mean(axis=1)
-    covered[rows] = other.is_at(middles, SAME_LAYER)
-    return covered
-
-
-def overlap_notes(layers: Sequence[Layer], names: Sequence[str]) -> list[str]:
-    """Return a note on each two layers that lie on each other in part, with the area."""
-    notes = []
-    for one, two in combinations(range(len(layers)), 2):
-        a, b = layers[one], layers[two]
-        # The finer one of both says how far it goes.
-        area = max(area_of(layer, covered_faces(layer, other)) for layer, other in ((a, b), (b, a)))
-        if area > _OVERLAP:
-            notes.append(
-                f"{names[one]} and {names[two]} lie on each other over {area_words(area)}: both are kept; delete one of them there, unless "
-                "it is a pocket or a facing"
-            )
-    return notes
-
-
-def surplus_faces(vertices: FloatArray, polygons: NDArray[np.int64], part: IntArray) -> tuple[BoolArray, list[str]]:
-    """Return which polygons (#F) are no cloth of their own, and notes, before vertices at one place are joined.
-
-    Of a closed part that is thick cloth these are the inner sheet and the rim, which else would be joined to those of the next; of others
-    what lies on a larger part with vertices of its own.
-
-    Args:
-        vertices: #V by 3 [m].
-        polygons: #F by k vertices, filled up with -1.
-        part: #F, the connected part of each; -1 for those that repair drops.
-    """
-    given = np.flatnonzero(part >= 0)
-    distinct, keep, _ = distinct_corners(polygons[given])
-    given = given[keep]
-    faces, of = split_polygons(vertices, distinct[keep])
-    own = part[given[of]]
-    single = np.ones(len(faces), dtype=bool)
-    rows, layers, notes = list[NDArray[np.int64]](), list[Layer](), list[str]()
-    for number in np.argsort(-np.bincount(own), kind="stable")[:_MOST_PARTS].tolist():
-        row = np.flatnonzero(own == number)
-        used, place = np.unique(faces[row], return_inverse=True)
-        points, corners = vertices[used[used >= 0]], place.reshape(-1, 4).astype(np.int32) - np.int32(used[0] < 0)
-        he = half_edges(corners)
-        if (he.count == 2).all():
-            with suppress(InputError):  # a one-sided part has no sides
-                corners = orient(he)[0]
-                if (sheet := outer_sheet(points, half_edges(corners))) is not None:
-                    notes.append(sheet.describe())
-                    single[row[~sheet.faces]] = False
-                    row, corners = row[sheet.faces], corners[sheet.faces]
-        rows.append(row)
-        layers.append(Layer(points, corners))
-    order = sorted(range(len(rows)), key=lambda number: -layers[number].area)
-    second = np.zeros(len(faces), dtype=bool)
-    for after, small in enumerate(order):
-        for large in order[:after]:
-            second[rows[small]] |= covered_faces(layers[small], layers[large])
-    if second.any():
-        area = float(flat_areas(vertices, faces[second]).sum())
-        count = format_count(len(np.unique(of[second])), "face")
-        notes.append(f"{count} of {area_words(area)} dropped: a second layer that lies on another part there")
-    surplus = np.zeros(len(polygons), dtype=bool)
-    surplus[given] = np.bincount(of, single & ~second, minlength=len(given)) == 0.0
-    return surplus, notes
-
-
-def area_of(layer: Layer, chosen: BoolArray) -> float:
-    """Return the area [m2] of the chosen faces (#F)."""
-    return float(flat_areas(layer.vertices, layer.faces[chosen]).sum())
-
-
 def _has_faces(whole: Layer, part: Layer) -> bool:
-    place, near = whole.vertices_at(part.vertices, SAME_LAYER)
+    place, near = whole.vertices_at(part.vertices, _SAME_LAYER)
     if not near.all():
         return False
     known = {tuple(sorted(face)) for face in whole.faces.tolist()}

@@ -12,18 +12,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.polyline import arc_lengths
-from warpflat.flat.surface.connectivity import border_loops, join_labels
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.normals import area_vectors
+from warpflat.core import FloatArray, IntArray, arc_lengths
+from warpflat.flat import Surface, area_vectors, border_loops, join_labels
+from warpflat.pattern import MEET
 
-__all__ = ["MEET", "SAME_PLACE", "meet_borders"]
+__all__ = ["SAME_PLACE", "meet_borders"]
 
 #: Points nearer to each other than this [m] are at one place in space.
 SAME_PLACE = 1e-5
-#: Borders that run along each other within this distance [m] are meant to meet.
-MEET = 1e-3
 # Of one border only places that lie within this share of the tolerance can meet, and further apart along it than so many times that far:
 # an open wedge stays open.
 _OWN, _APART = 0.1, 8.0

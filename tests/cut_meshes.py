@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from surface_meshes import quads_between
 
+from warpflat.flat.surface.connectivity import euler_characteristic, non_manifold_vertices
 from warpflat.flat.surface.cut.cut_mesh import Cut
-from warpflat.flat.surface.half_edges import half_edges
+from warpflat.flat.surface.half_edges import border_edges, half_edges
 from warpflat.flat.surface.mesh import Surface
+from warpflat.flat.surface.paths.trace import path_triangles
 
 
 def surface(vertices: NDArray, faces: NDArray, lines: Mapping[str, list[int]] | None = None) -> Surface:
@@ -84,3 +88,39 @@ def glue(cut: Cut) -> NDArray[np.int32]:
     used = faces >= 0
     faces[used] = cut.vertex_origin[faces[used]]
     return faces
+
+
+def triangle_areas(mesh):
+    triangles, face = path_triangles(mesh)
+    a, b, c = (mesh.vertices[triangles[:, k]] for k in range(3))
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1), face
+
+
+def border_length(mesh):
+    ends = mesh.vertices[border_edges(mesh.faces)]
+    return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
+
+
+def broken_by_split(mesh, result):
+    """What holds of every split, and not of this one: the same surface, no hanging vertex, correct maps, lines along edges."""
+    new, count = result.surface, len(mesh.vertices)
+    blend = np.einsum("nk,nkd->nd", result.vertex_weights, mesh.vertices[result.vertex_support])
+    area_before, face_before = triangle_areas(mesh)
+    area_after, face_after = triangle_areas(new)
+    whole = np.bincount(face_before, weights=area_before)
+    parts = np.bincount(result.face_origin[face_after], weights=area_after)
+    edges = edge_set(new.faces)
+    steps = [tuple(sorted(step)) for line in [result.path, *new.lines.values()] for step in pairwise(line.tolist())]
+    holds = {
+        "given vertices stay": np.array_equal(new.vertices[:count], mesh.vertices),
+        "weights give the new vertices": np.allclose(new.vertices, blend, rtol=0.0, atol=1e-12),
+        "the input gives the vertices": np.array_equal(new.input_vertices[new.input_index], new.vertices),
+        "parts fill their faces": np.allclose(parts, whole, rtol=1e-10, atol=1e-12 * whole.max()),
+        "it is a manifold": half_edges(new.faces).count.max() <= 2 and len(non_manifold_vertices(new.faces)) == 0,
+        # A vertex hanging on an edge would be a slit, and hence border.
+        "the border is as long": border_length(new) == pytest.approx(border_length(mesh), rel=1e-12),
+        "it is no other surface": euler_characteristic(new.faces) == euler_characteristic(mesh.faces),
+        "faces use every vertex": np.array_equal(np.unique(new.faces[new.faces >= 0]), np.arange(len(new.vertices))),
+        "lines run along edges": edges.issuperset(steps),
+    }
+    return [what for what, is_so in holds.items() if not is_so]

@@ -18,8 +18,8 @@ from warpflat.app.scene.plan import plan_scene
 from warpflat.flat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.normals import flat_areas
-from warpflat.flat.surface.repair.meet import meet_borders
 from warpflat.flat.surface.repair.validate import make_surface
+from warpflat.garment.construction.meet import meet_borders
 from warpflat.garment.construction.sew_pieces import meeting_borders, unsewn_borders
 
 

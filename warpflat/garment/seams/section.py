@@ -7,12 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
-from warpflat.core.polyline import project_on_segments
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.paths.trace import (
+from warpflat.core import FloatArray, InputError, IntArray, project_on_segments
+from warpflat.flat import (
     Place,
+    Surface,
     SurfacePath,
     VertexStar,
     describe_place,

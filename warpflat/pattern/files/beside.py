@@ -19,10 +19,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from warpflat.core.activity import activity_listener, report_activity
-from warpflat.core.input_files import listening_to_reads, note_read
-from warpflat.core.left_out import LeftOut, leave_out, listening_to_left_out
-from warpflat.core.threads import thread_count
+from warpflat.core import activity_listener, listening_to_reads, note_read, report_activity, thread_count
+from warpflat.pattern.files.left_out import LeftOut, leave_out, listening_to_left_out
 
 __all__ = ["Beside", "two_at_a_time", "work_beside"]
 
@@ -120,7 +118,7 @@ def two_at_a_time(function: Callable[[Item], Result], items: Iterable[Item]) -> 
     """Yield what a function makes of items, in their order, every other one in a process of its own."""
 
     def on_one_core(item: Item) -> Result:
-        from warpflat.core.launch import on_one_thread
+        from warpflat.core import on_one_thread
 
         with on_one_thread():
             return function(item)

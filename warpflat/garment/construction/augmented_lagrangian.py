@@ -15,17 +15,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
-from warpflat.flat.model.network import SpringNetwork
-from warpflat.flat.solver.contact import Barrier
-from warpflat.flat.solver.energy import Energy
-from warpflat.flat.solver.grain import align_grain
-from warpflat.flat.solver.metric import Metric, StiffnessFactor, equation_rows
-from warpflat.flat.solver.minimise import Cloth, Descent
-from warpflat.flat.solver.options import RelaxOptions
-from warpflat.flat.solver.steps import Relaxation, relax_by_steps, take_first_steps
-from warpflat.flat.solver.stop import Outcome
-from warpflat.flat.surface.laplacian import MOST_FACTORED
+from warpflat.core import FloatArray
+from warpflat.flat import (
+    MOST_FACTORED,
+    Barrier,
+    Cloth,
+    Descent,
+    Energy,
+    Metric,
+    Outcome,
+    Relaxation,
+    RelaxOptions,
+    SpringNetwork,
+    StiffnessFactor,
+    align_grain,
+    equation_rows,
+    relax_by_steps,
+    take_first_steps,
+)
 
 __all__ = ["ConstrainedOutcome", "factor_pays", "relax_under_equations"]
 

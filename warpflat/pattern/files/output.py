@@ -38,12 +38,20 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core.errors import SIGNALS, CannotWriteError, InputError, expect, system_reason
-from warpflat.core.file_names import check_file_name
-from warpflat.core.input_files import file_digest, listening_to_reads, read_result
-from warpflat.core.left_out import LeftOut, is_heard, leave_out, listening_to_left_out
-from warpflat.core.memory_limit import is_out_of_memory
-from warpflat.core.text import one_line
+from warpflat.core import (
+    SIGNALS,
+    CannotWriteError,
+    InputError,
+    check_file_name,
+    expect,
+    file_digest,
+    is_out_of_memory,
+    listening_to_reads,
+    one_line,
+    read_result,
+    system_reason,
+)
+from warpflat.pattern.files.left_out import LeftOut, is_heard, leave_out, listening_to_left_out
 
 __all__ = [
     "NotOursError",

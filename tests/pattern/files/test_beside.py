@@ -14,10 +14,10 @@ import pytest
 
 import warpflat
 from warpflat.core.activity import activity_listener
-from warpflat.core.beside import Beside, two_at_a_time, work_beside
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import note_read
-from warpflat.core.output import atomic_path, output_folder
+from warpflat.pattern.files.beside import Beside, two_at_a_time, work_beside
+from warpflat.pattern.files.output import atomic_path, output_folder
 
 
 @pytest.fixture(autouse=True)

@@ -6,8 +6,7 @@ import os
 import re
 from datetime import datetime, timezone
 
-from warpflat.core.errors import InputError
-from warpflat.core.text import quote_value
+from warpflat.core import InputError, quote_value
 
 __all__ = ["source_date"]
 

@@ -10,13 +10,8 @@ import pytest
 
 from warpflat.app.cli.environment import require_environment
 from warpflat.core.errors import CannotWriteError, InputError, StepError
-from warpflat.core.left_out import LeftOut, listening_to_left_out
-from warpflat.core.output import (
-    atomic_path,
-    optional_step,
-    output_folder,
-    write_report,
-)
+from warpflat.pattern.files.left_out import LeftOut, listening_to_left_out
+from warpflat.pattern.files.output import atomic_path, optional_step, output_folder, write_report
 
 
 def test_a_step_that_cannot_be_taken_is_a_note_and_the_run_goes_on(tmp_path: Path):

@@ -9,20 +9,27 @@ from os import PathLike
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.errors import InputError
-from warpflat.core.file_names import make_file_name, make_piece_name
-from warpflat.core.text import area_words, format_count
-from warpflat.flat.surface.io.raw_mesh import ALL_PRIMS
-from warpflat.flat.surface.io.read import POSSIBLE, check_size, read_mesh_file, wrong_size
-from warpflat.flat.surface.mesh import Surface
-from warpflat.flat.surface.normals import flat_areas
-from warpflat.flat.surface.repair.layers import Layer, overlap_notes, surplus_layers
-from warpflat.flat.surface.repair.meet import MEET, meet_borders
-from warpflat.flat.surface.repair.polygons import split_polygons
-from warpflat.flat.surface.repair.validate import ClosedSurfaceError, make_surface, parts_of_faces
+from warpflat.core import FloatArray, InputError, IntArray, area_words, format_count, make_file_name
+from warpflat.flat import (
+    ALL_PRIMS,
+    POSSIBLE,
+    ClosedSurfaceError,
+    Layer,
+    Surface,
+    check_size,
+    flat_areas,
+    make_surface,
+    parts_of_faces,
+    read_mesh_file,
+    split_polygons,
+    surplus_layers,
+    wrong_size,
+)
+from warpflat.garment.construction.meet import meet_borders
+from warpflat.garment.construction.overlapping_layers import overlap_notes
+from warpflat.pattern import MEET
 
-__all__ = ["object_parts", "read_pieces"]
+__all__ = ["make_piece_name", "object_parts", "read_pieces"]
 
 
 def read_pieces(
@@ -113,6 +120,11 @@ def read_pieces(
     )
     notes += met
     return (replace(kept[0], notes=tuple(dict.fromkeys([*notes, *kept[0].notes]))), *kept[1:])
+
+
+def make_piece_name(name: str) -> str:
+    """Return a piece's name made of one that was not chosen for it, such as that of a material: an edge of it is "piece.edge"."""
+    return make_file_name(name).replace(".", "_")
 
 
 def object_parts(
