@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from warpflat.app.scene.load import load_scene, make_scene
-from warpflat.app.scene.plan import plan_garment
+from warpflat.app.scene.plan import plan_form_scene
 from warpflat.core.polyline import polyline_length
 from warpflat.flat.model.fit import TOLERATED
 from warpflat.garment.construction.garment import Garment
@@ -95,7 +95,7 @@ def flattened(size: str) -> Garment:
     else:
         table = load_scene(SCENE).settings.model_dump(exclude_unset=True, by_alias=True)
     scene = make_scene({**table, "mannequin": {"size": size}}, name="block", folder=SCENE.parent, where=str(SCENE))
-    return plan_garment(scene).flatten()
+    return plan_form_scene(scene).flatten()
 
 
 def bodice_values(garment: Garment, face: str) -> dict[str, float]:

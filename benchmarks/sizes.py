@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.app.scene.load import load_scene, make_scene
-from warpflat.app.scene.plan import plan_garment
+from warpflat.app.scene.plan import plan_form_scene
 from warpflat.flat.model.fit import TOLERATED
 from warpflat.garment.construction.garment_files import garment_files
 
@@ -34,7 +34,7 @@ def measure(scene_name: str, size: str) -> dict[str, Any]:
     scene = load_scene(SCENES / f"{scene_name}.toml")
     table = scene.settings.model_dump(exclude_unset=True, by_alias=True)
     table["mannequin"] = {"size": size}
-    plan = plan_garment(make_scene(table, name=scene.name, folder=scene.folder, where=scene_name))
+    plan = plan_form_scene(make_scene(table, name=scene.name, folder=scene.folder, where=scene_name))
     garment = plan.flatten()
     metrics = garment.metrics()
     with tempfile.TemporaryDirectory() as folder:

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from warpflat.app.scene.load import make_scene
-from warpflat.app.scene.plan import plan_garment
+from warpflat.app.scene.plan import plan_form_scene
 from warpflat.app.scene.wardrobe import garment_offer, scene_text
 from warpflat.core.polyline import polyline_length
 from warpflat.garment.construction.garment import Garment
@@ -51,7 +51,7 @@ TOLD = 15.0
 def flattened(name: str, size: str) -> tuple[Garment, dict[str, Any]]:
     """Return a garment of the wardrobe, and its drafted pieces by name."""
     text = scene_text(garment_offer(name), {"size": size}, {}, file="x.toml")
-    plan = plan_garment(make_scene(tomllib.loads(text), name=name, folder=Path(), where=name))
+    plan = plan_form_scene(make_scene(tomllib.loads(text), name=name, folder=Path(), where=name))
     garment = plan.flatten()
     pattern, _ = pattern_of_garment({"": garment}, name=name, rules=plan.drawing.rules)
     return garment, {piece.name: piece for piece in draft_garment(pattern).pieces[""]}

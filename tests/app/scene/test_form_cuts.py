@@ -15,7 +15,7 @@ from warpflat.app.scene.form_edits import edit_dart, rotate_dart, split_dart, tu
 from warpflat.app.scene.form_shaping import settle_shape, without_closed_darts
 from warpflat.app.scene.ledger import scene_ledger, with_cut
 from warpflat.app.scene.load import make_scene
-from warpflat.app.scene.plan import plan_garment
+from warpflat.app.scene.plan import plan_form_scene
 from warpflat.app.scene.run import run_scene
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, polyline_length
@@ -62,7 +62,7 @@ def test_a_trial_tells_the_energy_of_the_piece_in_the_garment(ledger):
     entry = next(
         entry for entry in ledger.entries if entry.cut["name"] == "waist dart" and entry.cut["piece"] == "front"
     )
-    garment = plan_garment(with_cut(scene(curves_mm=0), entry.cut)).flatten()
+    garment = plan_form_scene(with_cut(scene(curves_mm=0), entry.cut)).flatten()
     assert garment.sewn.converged
     # Sewn to the back it stores a little more.
     alone, sewn = entry.model_energy_after, garment.pieces["front"].stages[-1].model_energy_j
@@ -107,11 +107,11 @@ def test_darts_are_made_until_the_cloth_keeps_its_limit():
     front = {"pieces": {"front": {"bricks": ["shoulder-waist/front-*"], "datum": "centre front"}}}
     # What stands out at the bust is taken in from the side here, and the rest from the shoulder.
     for fabric, darts in (("woven", {"bust dart", "shoulder dart"}), ("isotropic", {"shoulder dart", "waist dart"})):
-        bare = plan_garment(scene(form=front, fabric=fabric)).flatten().pieces["front"].fit
+        bare = plan_form_scene(scene(form=front, fabric=fabric)).flatten().pieces["front"].fit
         assert bare.misfits[0].words.startswith("sheared " if fabric == "woven" else "stretched ")
         assert bare.outside > 0.1
         shaped, notes = settle_shape(scene(shape="auto", form=front, fabric=fabric))
-        garment = plan_garment(shaped).flatten()
+        garment = plan_form_scene(shaped).flatten()
         assert {(dart.piece, dart.asked.name) for dart in garment.form.darts} == {("front", dart) for dart in darts}
         assert "front.shoulder dart along princess front left releases" in notes[0]
         # An isotropic sheet does not shear more easily than it stretches; a book has no dart for what is left of it.
@@ -250,20 +250,20 @@ def test_a_dart_that_the_body_does_not_want_is_left_out(tmp_path: Path):
     assert result.metrics["pieces"]["back"]["darts"]
     # What a scene asks for itself is made as it is asked for.
     own = {"piece": "front", "line": "princess front left", "mouth_mm": 8}
-    kept = plan_garment(scene(**tables, cuts=[own], curves_mm=0)).flatten()
+    kept = plan_form_scene(scene(**tables, cuts=[own], curves_mm=0)).flatten()
     assert without_closed_darts(scene(**tables, cuts=[own]), [kept])[1] == ()
 
 
 def test_a_dart_too_near_the_armhole_moves_to_the_shoulder_or_goes(monkeypatch):
     asked = scene(shape="darts", half=True, curves_mm=0)
-    made = plan_garment(asked).flatten()
+    made = plan_form_scene(asked).flatten()
     # A size table leaves room for it.
     assert without_closed_darts(asked, [made])[1] == ()
     # It lies 38 mm off; no strip of less than 60 mm may be left now, which a dart from the shoulder leaves.
     monkeypatch.setattr("warpflat.garment.construction.darts.NEAR_ARMHOLE", 0.06)
     moved, (note,) = without_closed_darts(asked, [made])
     assert note.startswith("front: the bust dart lies along the shoulder's princess line instead")
-    darts = plan_garment(moved).flatten().metrics()["pieces"]["front"]["darts"]
+    darts = plan_form_scene(moved).flatten().metrics()["pieces"]["front"]["darts"]
     assert {dart["name"] for dart in darts} == {"shoulder dart left", "waist dart left"}
     # One on a shoulder too narrow for it goes.
     monkeypatch.setattr("warpflat.app.scene.form_shaping.NEAR_ARMHOLE", 0.20)

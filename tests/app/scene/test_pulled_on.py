@@ -10,7 +10,7 @@ import tomllib
 
 from warpflat.app.scene.form import scene_form
 from warpflat.app.scene.load import Scene, load_scene, scene_fabric
-from warpflat.app.scene.plan import plan_garment
+from warpflat.app.scene.plan import plan_form_scene
 from warpflat.app.scene.wardrobe import garment_offer, offer_tables, scene_text
 from warpflat.core.errors import InputError
 from warpflat.garment.construction.girths import pattern_girths
@@ -30,7 +30,7 @@ def scene_of(folder: Path, garment: str, body: dict[str, Any], **more: str) -> S
 
 def rings_on_form(scene: Scene) -> tuple[dict[str, GarmentRing], tuple[str, ...]]:
     mannequin, form = scene_form(scene)
-    plan = plan_garment(scene, built=(mannequin, form))
+    plan = plan_form_scene(scene, built=(mannequin, form))
     on_form = {name: piece.surface.vertices for name, piece in form.pieces.items()}
     rings = measure_rings(
         mannequin, form, on_form, strain_limit=scene_fabric(scene).strain_limit,
@@ -97,7 +97,7 @@ def test_what_does_not_go_together_is_refused(tmp_path: Path, text: str, message
 def test_zip_is_a_share_of_its_line_in_whole_centimetres(tmp_path: Path, garment: str):
     lengths = []
     for body in (CHILD, TALL_MAN):
-        (opening,) = plan_garment(scene_of(tmp_path, garment, body)).openings
+        (opening,) = plan_form_scene(scene_of(tmp_path, garment, body)).openings
         assert opening.length == pytest.approx(round(opening.length, 2), abs=1e-12)
         lengths.append(opening.length)
     assert 0.35 < lengths[0] < lengths[1] < 0.75
@@ -108,7 +108,7 @@ def test_an_opening_suits_each_size(tmp_path: Path):
         'form = "dress"\n[mannequin]\nsize = "EU 38"\nresolution_mm = 40\n[[openings]]\nkind = "zip"\nseam = "centre back"\n'
         'length_share = 0.5\n[pattern]\nsizes = ["EU 140"]\n'
     )
-    plan = plan_garment(load_scene(tmp_path / "x.toml"))
+    plan = plan_form_scene(load_scene(tmp_path / "x.toml"))
     assert plan.other_sizes()["EU 140"].openings[0].length_mm < plan.openings[0].length_mm
 
 
@@ -120,7 +120,7 @@ def test_length_share_before_start_is_named(tmp_path: Path):
         InputError,
         match=r"^\S+\.toml: openings\[0\]: length_share = 0.1 ends \d+ mm along 'crotch back', and start_mm begins at 200",
     ):
-        plan_garment(load_scene(tmp_path / "x.toml"))
+        plan_form_scene(load_scene(tmp_path / "x.toml"))
 
 
 def test_a_depth_in_centimetres_takes_the_place_of_a_share():

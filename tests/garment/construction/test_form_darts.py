@@ -7,7 +7,7 @@ import pytest
 from bodies import body_of_size
 
 from warpflat.app.scene.load import make_scene
-from warpflat.app.scene.plan import plan_garment
+from warpflat.app.scene.plan import plan_form_scene
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
 from warpflat.flat.surface.overlap import OVERLAP
@@ -267,7 +267,7 @@ def test_darts_whose_legs_overlap_are_refused(sewn):
 def test_scenes_that_ask_for_impossible_shapes(tmp_path, more, message):
     table = {"form": "basic_block", "mannequin": {"size": "EU 38", "resolution_mm": 40}, **more}
     with pytest.raises(InputError, match=message):
-        plan_garment(make_scene(table, name="x", folder=tmp_path, where="x.toml"))
+        plan_form_scene(make_scene(table, name="x", folder=tmp_path, where="x.toml"))
 
 
 def test_a_cut_of_a_scene_replaces_the_dart_along_its_line(tmp_path):
@@ -278,7 +278,7 @@ def test_a_cut_of_a_scene_replaces_the_dart_along_its_line(tmp_path):
         "ease": "close",
         "mannequin": {"size": "EU 38", "resolution_mm": 40},
     }
-    plan = plan_garment(make_scene({**table, "cuts": [cut]}, name="x", folder=tmp_path, where="x.toml"))
+    plan = plan_form_scene(make_scene({**table, "cuts": [cut]}, name="x", folder=tmp_path, where="x.toml"))
     front = [dart for dart in plan.form.darts if dart.piece == "front_bodice"]
     assert [(d.name, d.asked.mouth_mm) for d in front if d.name.endswith("left")] == [
         ("bust dart left", None),

@@ -11,7 +11,7 @@ from warpflat.app.scene.cuts import asked_cuts, omitted, place_of, scene_with
 from warpflat.app.scene.form import scene_recipe
 from warpflat.app.scene.ledger import candidate_cuts, trial_of_scene, try_cuts, with_cut
 from warpflat.app.scene.load import Scene
-from warpflat.app.scene.plan import plan_garment
+from warpflat.app.scene.plan import plan_form_scene
 from warpflat.flat import Flattening, LedgerEntry, RankedBy
 from warpflat.garment import (
     ELBOW,
@@ -205,11 +205,11 @@ def sewn_form(scene: Scene, *, device: str | None = None) -> tuple[Scene, FormGa
     """Return a scene without the darts that cannot be sewn, its garment, flattened and sewn, and one sentence for each of these darts.
 
     Raises:
-        InputError: as :func:`warpflat.app.scene.plan.plan_garment`.
+        InputError: as :func:`warpflat.app.scene.plan.plan_form_scene`.
     """
 
     def sewn(one: Scene) -> FormGarment:
-        garment = plan_garment(one, device=device).flatten()
+        garment = plan_form_scene(one, device=device).flatten()
         require_open_darts(one, [garment])
         return garment
 

@@ -18,7 +18,7 @@ from warpflat.app.scene.cuts import (
 )
 from warpflat.app.scene.form import scene_form, scene_recipe
 from warpflat.app.scene.load import Scene, errors_named, scene_relax_options
-from warpflat.app.scene.plan import GarmentPlan, flatten_surface, plan_garment, scene_cuts
+from warpflat.app.scene.plan import FormScenePlan, flatten_surface, plan_form_scene, scene_cuts
 from warpflat.core import InputError, without_side
 from warpflat.flat import (
     CutPlan,
@@ -92,17 +92,17 @@ def cuts_of_entry(ledger: Ledger, number: int) -> CutSequence:
     return CutSequence(surface=result.surface, plans=tuple(CutPlan.from_applied(made) for made in result.cuts))
 
 
-def trial_of_scene(scene: Scene, *, device: str | None = None) -> tuple[GarmentPlan, Garment]:
+def trial_of_scene(scene: Scene, *, device: str | None = None) -> tuple[FormScenePlan, Garment]:
     """Return a scene's garment, and its pieces, relaxed coarsely one by one, with the legs of their darts sewn.
 
     Raises:
-        InputError: as :func:`warpflat.app.scene.plan.plan_garment`.
+        InputError: as :func:`warpflat.app.scene.plan.plan_form_scene`.
     """
-    plan = plan_garment(scene, device=device)
+    plan = plan_form_scene(scene, device=device)
     return plan, _flatten(plan, plan.form.pieces)
 
 
-def _flatten(plan: GarmentPlan, names: Sequence[str] | Mapping[str, Any], scene: Scene | None = None) -> Garment:
+def _flatten(plan: FormScenePlan, names: Sequence[str] | Mapping[str, Any], scene: Scene | None = None) -> Garment:
     """Flatten some pieces of a plan's form, or of another scene's form on its body, without seams between them."""
     form = plan.form if scene is None else scene_form(scene, plan.mannequin)[1]
     alone = replace(form, pieces={name: form.pieces[name] for name in names}, seams=(), ease={})
@@ -111,7 +111,7 @@ def _flatten(plan: GarmentPlan, names: Sequence[str] | Mapping[str, Any], scene:
 
 
 def candidate_cuts(
-    plan: GarmentPlan, garment: Garment, *, among: Collection[str] | None = None, usual_only: bool = False
+    plan: FormScenePlan, garment: Garment, *, among: Collection[str] | None = None, usual_only: bool = False
 ) -> Iterator[tuple[dict[str, Any], Price]]:
     """Yield tables of cuts that the pieces do not have yet: once a side, as both sides are cut; and what they would do.
 
@@ -180,7 +180,7 @@ def with_cut(scene: Scene, cut: Mapping[str, Any], mannequin: Mannequin | None =
 
 
 def try_cuts(
-    plan: GarmentPlan,
+    plan: FormScenePlan,
     garment: Garment,
     cuts: Sequence[tuple[Mapping[str, Any], Price]],
     *,

@@ -68,11 +68,11 @@ if TYPE_CHECKING:
     from warpflat.pattern import Pattern
 
 __all__ = [
-    "GarmentPlan",
+    "FormScenePlan",
     "MeshPlan",
     "Plan",
     "flatten_surface",
-    "plan_garment",
+    "plan_form_scene",
     "plan_mesh",
     "plan_scene",
     "scene_cuts",
@@ -267,7 +267,7 @@ class MeshPlan(Plan):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class GarmentPlan(Plan):
+class FormScenePlan(Plan):
     """A garment whose pieces are a form on a mannequin.
 
     Attributes:
@@ -275,7 +275,7 @@ class GarmentPlan(Plan):
         wishes: fullness and gathers of seams.
         constraints: on edges and lines.
         openings: along seams.
-        settings: further arguments of :func:`warpflat.garment.construction.garment.flatten_form`.
+        settings: further arguments of :func:`warpflat.garment.construction.form_garment.flatten_form`.
     """
 
     mannequin: Mannequin
@@ -326,12 +326,12 @@ class GarmentPlan(Plan):
             remarks=(*unsewn, *garment.remarks),
         )
 
-    def in_cloth(self, scene: Scene) -> GarmentPlan:
+    def in_cloth(self, scene: Scene) -> FormScenePlan:
         """See :meth:`Plan.in_cloth`; a form that is pulled on grows by its cloth, any other stays; darts for woven cloth stay, too."""
         built = self.mannequin, self.form
         if scene.settings.pulled_on:
             built = scene_form(self.scene, self.mannequin, strain_limit=scene_fabric(scene).strain_limit)
-        return plan_garment(scene, device=self.device, built=built)
+        return plan_form_scene(scene, device=self.device, built=built)
 
     def advise(self, piece: Flattening) -> Flattening:
         """Return a piece with cuts that would help, each with the table of a scene's `[[cuts]]` that makes it, if one can."""
@@ -384,7 +384,7 @@ def plan_scene(
     cuts: CutSequence | None = None,
     built: tuple[Mannequin, FormResult] | None = None,
 ) -> Plan:
-    """Check what a scene asks of its garment, wherever its pieces come from; see :func:`plan_mesh` and :func:`plan_garment`.
+    """Check what a scene asks of its garment, wherever its pieces come from; see :func:`plan_mesh` and :func:`plan_form_scene`.
 
     Raises:
         InputError: the source, a line, a cut, the fabric, a seam or a setting is wrong.
@@ -392,7 +392,7 @@ def plan_scene(
     fabric_of_correction(scene)  # a mistake is reported before anything is made
     if scene.settings.mannequin is None:
         return plan_mesh(scene, device=device, cuts=cuts)
-    return plan_garment(scene, device=device, built=built)
+    return plan_form_scene(scene, device=device, built=built)
 
 
 def plan_mesh(scene: Scene, *, device: str | None = None, cuts: CutSequence | None = None) -> MeshPlan:
@@ -530,9 +530,9 @@ def _sized_openings(scene: Scene, form: FormResult) -> list[OpeningTable]:
     return found
 
 
-def plan_garment(
+def plan_form_scene(
     scene: Scene, *, device: str | None = None, built: tuple[Mannequin, FormResult] | None = None
-) -> GarmentPlan:
+) -> FormScenePlan:
     """Check what a scene asks of its garment.
 
     Args:
@@ -567,7 +567,7 @@ def plan_garment(
         )
     ruled = {(each.piece, each.line) for each in constraints if isinstance(each, Straight)}
     constraints += [each for each in straight_stands(form, openings) if (each.piece, each.line) not in ruled]
-    return GarmentPlan(
+    return FormScenePlan(
         scene=scene,
         drawing=drawing,
         device=device,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from warpflat.app.scene.cuts import asked_cuts, cut_of_dart, place_of
-from warpflat.app.scene.plan import GarmentPlan
+from warpflat.app.scene.plan import FormScenePlan
 from warpflat.app.studio.cut_tables import rounded
 from warpflat.app.studio.solve import Solution
 from warpflat.core import FloatArray, arc_lengths, unit
@@ -83,7 +83,7 @@ def _slid(
     return Handle(name=name, piece=piece, place=place, change=lambda to: change(float((to - place) @ direction)))
 
 
-def _of_darts(plan: GarmentPlan, name: str, flat: FloatArray) -> Iterator[Handle]:
+def _of_darts(plan: FormScenePlan, name: str, flat: FloatArray) -> Iterator[Handle]:
     """A tip goes along its dart's line; the ends of a mouth make the dart wider or narrower."""
     form = plan.form
     placed = {dart.name: dart for dart in form.darts if dart.piece == name}
@@ -110,7 +110,9 @@ def _of_darts(plan: GarmentPlan, name: str, flat: FloatArray) -> Iterator[Handle
             yield _slid(f"mouth of {dart_name}, {side}", name, place, across, wider)
 
 
-def _move_tip(plan: GarmentPlan, dart: PlacedDart, part: tuple[float, float], end: int, moved: float) -> dict[str, Any]:
+def _move_tip(
+    plan: FormScenePlan, dart: PlacedDart, part: tuple[float, float], end: int, moved: float
+) -> dict[str, Any]:
     """Return the cuts with one end of a dart further along its line."""
     length = float(arc_lengths(plan.form.vertices[dart.row])[-1])
     moved = max(moved, _SHORTEST - length) if end else min(moved, length - _SHORTEST)
@@ -126,13 +128,13 @@ def _move_tip(plan: GarmentPlan, dart: PlacedDart, part: tuple[float, float], en
     return _with_darts(plan, replace(asked, part=(ends[0], ends[1]), tip_mm=None))
 
 
-def _widen_mouth(plan: GarmentPlan, dart: PlacedDart, width: float, moved: float) -> dict[str, Any]:
+def _widen_mouth(plan: FormScenePlan, dart: PlacedDart, width: float, moved: float) -> dict[str, Any]:
     """Return the cuts with a dart whose mouth opens wider by twice what one of its ends was moved."""
     mouth = max(width + 2.0 * moved, _NARROWEST)
     return _with_darts(plan, replace(dart.asked, mouth_mm=round(1e3 * mouth, 1), like=None))
 
 
-def _with_darts(plan: GarmentPlan, *darts: FormDart) -> dict[str, Any]:
+def _with_darts(plan: FormScenePlan, *darts: FormDart) -> dict[str, Any]:
     """Return the cuts of a scene with darts as they are asked for now."""
     cuts = asked_cuts(plan.scene)
     for dart in darts:
@@ -141,7 +143,7 @@ def _with_darts(plan: GarmentPlan, *darts: FormDart) -> dict[str, Any]:
     return {"cuts": cuts}
 
 
-def _of_sides(solution: Solution, plan: GarmentPlan, name: str, flat: FloatArray) -> Iterator[Handle]:
+def _of_sides(solution: Solution, plan: FormScenePlan, name: str, flat: FloatArray) -> Iterator[Handle]:
     """A point of a side seam at a level gives the garment more or less ease there; darts there stay as wide as they are."""
     piece, layout = plan.form.pieces[name], plan.mannequin.layout
     asked = plan.scene.settings.ease
@@ -176,7 +178,7 @@ def _of_sides(solution: Solution, plan: GarmentPlan, name: str, flat: FloatArray
                 )  # fmt: skip
 
 
-def _of_neckline(plan: GarmentPlan, name: str, flat: FloatArray) -> Iterator[Handle]:
+def _of_neckline(plan: FormScenePlan, name: str, flat: FloatArray) -> Iterator[Handle]:
     """Points of the neckline on centre lines and shoulder seams make it deeper or wider."""
     piece, form = plan.form.pieces[name], plan.scene.settings.form
     now = asdict((plan.form.recipe.neckline or Neckline()).in_cm(plan.mannequin.layout, plan.form.body))

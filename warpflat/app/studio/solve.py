@@ -12,7 +12,7 @@ from warpflat.app.scene.cuts import CutSequence
 from warpflat.app.scene.form import scene_form, scene_mannequin
 from warpflat.app.scene.form_shaping import require_open_darts, settle_shape, with_open_darts
 from warpflat.app.scene.load import Scene, errors_named, scene_relax_options
-from warpflat.app.scene.plan import GarmentPlan, plan_garment, plan_mesh, scene_cuts
+from warpflat.app.scene.plan import FormScenePlan, plan_form_scene, plan_mesh, scene_cuts
 from warpflat.app.scene.surface import scene_surface
 from warpflat.flat import CutPlan, Flattening, Progress, Surface, Verdict, cut, judge
 from warpflat.garment import FormGarment, Garment, measure_darts
@@ -44,7 +44,7 @@ class Solution:
     scene: Scene
     garment: Garment
     bare: Surface | None = None
-    plan: GarmentPlan | None = None
+    plan: FormScenePlan | None = None
     notes: tuple[str, ...] = field(default=())
 
     @property
@@ -115,13 +115,13 @@ def solve(
     same_body = last is not None and _alike(scene, last.scene, _OF_BODY)
     mannequin = last.mannequin if last is not None and same_body else scene_mannequin(scene)
 
-    def made(one: Scene) -> tuple[GarmentPlan, FormGarment]:
+    def made(one: Scene) -> tuple[FormScenePlan, FormGarment]:
         nonlocal last
         if last is not None and same_body and _alike(one, last.scene, _OF_FORM):
             form = last.form
         else:
             form = scene_form(one, mannequin, before=None if last is None else last.form)[1]
-        plan = last = plan_garment(one, built=(mannequin, form))
+        plan = last = plan_form_scene(one, built=(mannequin, form))
         # Pieces that were flattened as the plan asks are known as they lay at rest before they were sewn.
         at_rest = dict[str, Flattening]()
         if before is not None and before.plan is not None and before.plan.settings == plan.settings:
