@@ -163,3 +163,16 @@ def test_the_ball_in_a_corner_of_three_sides_is_the_nearest_to_the_vertex_whiche
     wp.launch(find_planes, dim=count, inputs=inputs, outputs=[centre, normal, ball], device="cpu")
     np.testing.assert_array_equal(ball.numpy(), np.float32(radius))
     np.testing.assert_allclose(centre.numpy() + radius * normal.numpy(), middles, atol=1e-3 * radius)
+
+
+def test_what_has_sunk_to_the_legs_has_fallen_off():
+    """A tube twice as wide as the body: it is given up where its top comes to the legs, not 0.4 m below its place."""
+    cloth = cylinder_cloth(cloth_of(), scale=2.0, radius=RADIUS, height=HEIGHT, columns=COLUMNS, rows=ROWS)
+    body = cylinder_body(radius=RADIUS, height=10 * HEIGHT, columns=33)
+    start = cloth.designed + 5 * HEIGHT * np.array([0.0, 1.0, 0.0])
+    top = start[:, 1].max()
+    fallen = relax_drape(cloth, body, start=start, legs=top - 0.05)
+    assert fallen.fell_off
+    assert top - 0.4 < fallen.positions[:, 1].max() < top - 0.05
+    # What begins below the legs' level, as a stocking does, is not held there.
+    assert relax_drape(cloth, body, start=start, legs=top + 0.05).positions[:, 1].max() < top - 0.4

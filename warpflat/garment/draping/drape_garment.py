@@ -71,7 +71,7 @@ def drape(
         cloth, gripped = thread_elastics(cloth, elastics, solid)
         designed = Body(cloth.designed, cloth.faces, device=where)
     options = options or DrapeOptions()
-    worn, frames = come_to_rest(cloth, solid, [*hold, *gripped], options, callback)
+    worn, frames = come_to_rest(cloth, solid, [*hold, *gripped], options, callback, legs=leg_level(mannequin))
     sources = tuple(source for piece in pieces.values() for source in piece.surface.sources)
     # A cut that `warpflat.advise` has found on one side stands for that on the other side of the body, too.
     cuts = {}
@@ -90,15 +90,21 @@ def come_to_rest(
     hold: Sequence[str],
     options: DrapeOptions,
     callback: Callable[[int, float], None] | None,
+    *,
+    legs: float = -np.inf,
 ) -> tuple[DrapedCloth, tuple[NDArray[np.float32], ...]]:
     """Relax sewn cloth on a body, held as in :func:`drape`; return it, and where it was on its way (#V by 3 each [m]).
+
+    Args:
+        cloth, body, options, callback, legs: as of :func:`warpflat.garment.draping.relax_drape.relax_drape`.
+        hold: lines that stay where they are.
 
     Raises:
         InputError: an unknown line, or nothing holds the garment.
     """
     frames = list[NDArray[np.float32]]()
     worn = relax_drape(
-        cloth, body, options=options, held=held_vertices(cloth, hold), callback=callback,
+        cloth, body, options=options, held=held_vertices(cloth, hold), legs=legs, callback=callback,
         observer=lambda places: frames.append(places.astype(np.float32)),
     )  # fmt: skip
     worn.check_held()
@@ -139,6 +145,11 @@ def thread_elastics(cloth: SewnCloth, edges: Sequence[str], body: Body) -> tuple
         for _ in range(_LEVELLED):
             drawn[rows] = np.where([True, False, True], body.nearest(drawn[rows])[0], drawn[rows])
     return replace(cloth, designed=drawn), gripped
+
+
+def leg_level(body: Mannequin | None) -> float:
+    """Return the height at which a mannequin's legs are parted [m]; that of no body lies below everything."""
+    return -np.inf if body is None else float(body.line("thigh")[:, 1].mean())
 
 
 def hip_level(body: Mannequin | None) -> float:

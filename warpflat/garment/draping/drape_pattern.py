@@ -27,7 +27,7 @@ from warpflat.garment.construction.mirror import mirror_plane
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.check_sewn import check_sewn
 from warpflat.garment.draping.continue_pieces import continue_pieces, hang_from_edges, hood_beside_head
-from warpflat.garment.draping.drape_garment import come_to_rest, hip_level, thread_elastics
+from warpflat.garment.draping.drape_garment import come_to_rest, hip_level, leg_level, thread_elastics
 from warpflat.garment.draping.lay_around import Laid, lay_around
 from warpflat.garment.draping.lift import Lift, surface_lift, whole_lifts
 from warpflat.garment.draping.limbs import armpit_heights, limb_lines, on_arm
@@ -174,7 +174,7 @@ def drape_pattern(
     cloth, gripped = thread_elastics(cloth, threaded, solid)
     if gripped:
         notes.append(f"held by an elastic: {', '.join(threaded)}")
-    worn, frames = come_to_rest(cloth, solid, [*placement.hold, *gripped], options, callback)
+    worn, frames = come_to_rest(cloth, solid, [*placement.hold, *gripped], options, callback, legs=leg_level(body))
     if not lifted:
         # What it should lie on is the body below it.
         cloth, designed = replace(cloth, designed=solid.nearest(worn.positions)[0]), solid

@@ -95,7 +95,7 @@ class DrapedCloth:
         """
         if self.fell_off:
             raise StepError(
-                f"falls off: nothing on the body holds the garment, its top has sunk by over {_FALLEN:g} m; "
+                f"falls off: nothing on the body holds the garment, its top has sunk by over {_FALLEN:g} m, or to the legs; "
                 "make it narrower there, or name in [drape] a line that stays: hold = [...]"
             )
 
@@ -139,6 +139,7 @@ def relax_drape(
     options: DrapeOptions | None = None,
     held: BoolArray | None = None,
     start: FloatArray | None = None,
+    legs: float = -np.inf,
     callback: Callable[[int, float], None] | None = None,
     observer: Callable[[FloatArray], None] | None = None,
 ) -> DrapedCloth:
@@ -150,6 +151,7 @@ def relax_drape(
         options: friction, tolerance and limits.
         held: #V, vertices that do not move.
         start: #V by 3 [m]; the designed surface if not given.
+        legs: height below which the body is two legs [m]: what has sunk there from above has lost its hold.
         callback: called with the number of steps and the residual at every check.
         observer: called with the places (#V by 3 [m]) at the start and at every check.
 
@@ -164,7 +166,8 @@ def relax_drape(
     steps, rounds, residual, left = 0, 0, np.inf, np.inf
     observe = observer or (lambda _: None)
     observe(start)
-    lowest = -np.inf if energy.is_held else float(start[:, 1].max()) - _FALLEN
+    top = float(start[:, 1].max())
+    lowest = -np.inf if energy.is_held else max(top - _FALLEN, legs if legs < top else -np.inf)
     fell_off, before, stalled = False, np.inf, False
     least, gained, least_left, gained_round = np.inf, 0, np.inf, 0
     while not (fell_off or stalled):
