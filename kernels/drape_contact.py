@@ -14,9 +14,8 @@ FALLS = wp.constant(wp.float64(0.25))
 # The skin is never stiffer than this share of a vertex's fictitious mass, some quarter of the cloth in tension: a plane is found anew
 # where the cloth has slid to, a little off the one before, and by a stiffer skin that would be a blow.
 STIFFEST = wp.constant(wp.float64(0.015))
-# The normals of a groove's two sides have a cosine below this one, in shallow ones too: at .5 a jumpsuit that is tight between the legs did not
-# come to rest.
-TURNED = wp.constant(wp.float32(0.9))
+# The normals of a groove's two sides have a cosine below this one.
+TURNED = wp.constant(wp.float32(0.5))
 # What lies nearer to a ball's middle than this share of its radius is one more side of the groove, of so many at most; in a sharper groove
 # its middle would be farther off than so many radii. The middle goes so often from side to side.
 HITS = wp.constant(wp.float32(0.99))
