@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core import FloatArray, arc_lengths, nearest_on_polyline, polyline_length
-from warpflat.flat import LEAST_MOUTH, OVERLAP, check_tip_back
+from warpflat.flat import OVERLAP, check_tip_back
 from warpflat.garment.construction.closed_cuts import CLOSED
 from warpflat.garment.construction.constraints import DartMouth
 from warpflat.garment.construction.sewn import Stitching
@@ -28,6 +28,9 @@ __all__ = [
 ]
 
 
+# A mouth narrower than this [m] is no dart that anybody would sew. It is less than `LEAST_MOUTH` of cuts that are advised: a dart that is left
+# out in one size is so in all, and the same one takes in more in others.
+_NARROW = 3e-3
 #: A dart that comes nearer to the armhole [m] is no dart that anybody would sew: the strip between them curls.
 NEAR_ARMHOLE = 0.03
 
@@ -70,7 +73,7 @@ def dart_constraints(form: FormResult) -> list[DartMouth]:
 
 
 def closed_darts(form: FormResult, positions: Mapping[str, FloatArray]) -> list[FormDart]:
-    """Return the darts that do not open on one side of the body at least: they take in less than `LEAST_MOUTH`, or their legs overlap.
+    """Return the darts that do not open on one side of the body at least: their mouth is narrower than 3 mm, or their legs overlap.
 
     Args:
         form: whose darts they are.
@@ -85,7 +88,7 @@ def closed_darts(form: FormResult, positions: Mapping[str, FloatArray]) -> list[
         # The tips of a fish-eye dart may close a little.
         overlap = open_length(left, right)[1]
         most = OVERLAP if dart.name in form.pieces[dart.piece].fisheyes else CLOSED
-        if overlap > most or np.linalg.norm(left - right, axis=1).max() < LEAST_MOUTH:
+        if overlap > most or np.linalg.norm(left - right, axis=1).max() < _NARROW:
             found.append(dart.asked)
     return found
 
