@@ -28,8 +28,8 @@ __all__ = [
 ]
 
 
-# A mouth narrower than this [m] is no dart that anybody would sew. It is less than `LEAST_MOUTH` of cuts that are advised: a dart that is left
-# out in one size is so in all, and the same one takes in more in others.
+# A mouth narrower than this [m] is no dart that anybody would sew. It is less than `LEAST_MOUTH` of cuts that are advised: a dart that is
+# left out in one size is so in all, and takes in more in others.
 _NARROW = 3e-3
 #: A dart that comes nearer to the armhole [m] is no dart that anybody would sew: the strip between them curls.
 NEAR_ARMHOLE = 0.03
