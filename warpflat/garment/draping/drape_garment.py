@@ -148,7 +148,7 @@ def thread_elastics(cloth: SewnCloth, edges: Sequence[str], body: Body) -> tuple
 
 
 def leg_level(body: Mannequin | None) -> float:
-    """Return the height at which a mannequin's legs are parted [m]; that of no body lies below everything."""
+    """Return the height of a mannequin's thighs, where the body is two legs [m]; that of no body lies below everything."""
     return -np.inf if body is None else float(body.line("thigh")[:, 1].mean())
 
 
