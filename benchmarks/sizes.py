@@ -39,7 +39,7 @@ def measure(scene_name: str, size: str) -> dict[str, Any]:
     metrics = garment.metrics()
     with tempfile.TemporaryDirectory() as folder:
         options = replace(plan.drawing, formats=("json",))
-        drawn = garment_files({size: garment}, Path(folder), name=scene_name, options=options, sample_size=size).metrics
+        drawn = garment_files({size: garment}, Path(folder), name=scene_name, options=options).metrics
     wears = [piece["wear"] for piece in metrics["pieces"].values()]
     strains = [abs(w[f"strain_{thread}"][end]) for w in wears for thread in ("warp", "weft") for end in ("min", "max")]
     girths = [abs(g["ease_m"] - g["ease_wanted_m"]) for g in metrics["girths"].values() if "ease_wanted_m" in g]

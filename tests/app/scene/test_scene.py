@@ -20,6 +20,8 @@ from warpflat.app.scene.surface import scene_surface
 from warpflat.core.errors import InputError
 from warpflat.flat.fabric.fabric import DEFAULT_FABRIC
 from warpflat.flat.fabric.library import find_fabric
+from warpflat.garment.construction import to_pattern
+from warpflat.pattern.files.beside import Beside
 
 SCENES = Path(__file__).parents[3] / "scenes"
 DATA = os.environ.get("WARPFLAT_DATA")
@@ -334,12 +336,18 @@ def test_a_table_for_a_piece_of_a_garment_that_is_cut_where_it_is_kept(tmp_path:
     assert load_scene(write_scene(tmp_path, kept)).settings.pieces["front"].grain_angle == 5
 
 
-def test_sizes_lie_in_the_order_of_their_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    asked = list[str]()
-    monkeypatch.setattr(run, "garment_files", lambda sizes, *_, **__: asked.extend(sizes))
+def test_sizes_lie_in_the_order_of_their_table():
     settings = SimpleNamespace(pattern=SimpleNamespace(sizes=["US 2", "US 00"]))
-    plan = SimpleNamespace(
-        scene=SimpleNamespace(settings=settings, name="trial"), found=None, mannequin=None, drawing=None, size="US 0"
-    )
-    run._draft(plan, dict.fromkeys(("US 2", "US 00", "US 0")), tmp_path)
-    assert asked == ["US 00", "US 0", "US 2"]
+    plan = SimpleNamespace(scene=SimpleNamespace(settings=settings))
+    assert [*run._in_order(plan, dict.fromkeys(("US 2", "US 00", "US 0")))] == ["US 00", "US 0", "US 2"]
+
+
+def test_film_pictures_and_paper_show_one_drawing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    drawn = list[str]()
+    monkeypatch.setattr(Beside, "__enter__", lambda beside: beside)  # all in this process, where it is counted
+    describe = to_pattern.describe_worn
+    monkeypatch.setattr(to_pattern, "describe_worn", lambda *given: (drawn.append(given[-1].name), describe(*given))[1])
+    skirt = (SCENES / "circle_skirt.toml").read_text().replace("[mannequin]\n", "[mannequin]\nresolution_mm = 25\n")
+    result = run_scene(load_scene(write_scene(tmp_path, skirt, "skirt.toml")), tmp_path / "out")
+    assert {"frames.usdc", "picture.png", "pattern.pdf"} < {*result.files}
+    assert drawn == ["skirt"]

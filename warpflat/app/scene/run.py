@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -30,8 +30,10 @@ from warpflat.garment import (
 )
 from warpflat.pattern import (
     Beside,
+    LeftOut,
     WrittenPattern,
     expect_files,
+    listening_to_left_out,
     note_on_names,
     notes_left_out,
     optional_file,
@@ -42,7 +44,11 @@ from warpflat.pattern import (
 )
 
 if TYPE_CHECKING:
-    from warpflat.pattern import DraftedOutline
+    from functools import _lru_cache_wrapper
+
+    from warpflat.pattern import DraftedOutline, Pattern
+
+    Draw: TypeAlias = _lru_cache_wrapper[tuple[Pattern, tuple[str, ...]]]
 
 # From so many vertices on, pictures and pattern follow the film: beside it and the fit they would take the most memory of a run.
 _MANY = 500_000
@@ -168,12 +174,6 @@ def _run(
             film.worn = garment.pieces
             notes = plan.notes(garment)
             fit = beside.enter_context(Beside(partial(_measure_fit, plan, garment, folder), "measuring how it fits"))
-            drafted = _drafted(plan, garment) if filmed or output.picture else []
-            film.drafted = [copy for piece in drafted for copy in piece.worn]
-            draw = partial(garment.write_files, folder, picture=output.picture, drafted=drafted)
-            pictures = Beside(draw, "drawing the pictures")
-            if vertices < _MANY:
-                beside.enter_context(pictures)
             graded = dict[str, Garment]()
             for size, other in others.items():
                 with optional_step(f"size {size} was left out"):
@@ -181,11 +181,18 @@ def _run(
                         callback=lambda _, progress: None if on_progress is None else on_progress(progress)
                     )
             require_open_darts(scene, graded.values())
-            sizes = {**graded, plan.size: garment}
-            pattern = Beside(partial(_draft, plan, sizes, folder), "drafting the pattern")
+            sizes = _in_order(plan, {**graded, plan.size: garment})
+            draw = _draw_once(plan, sizes)
+            drafted = _drafted(plan, garment, draw) if filmed or output.picture else []
+            film.drafted = [copy for piece in drafted for copy in piece.worn]
+            show = partial(garment.write_files, folder, picture=output.picture, drafted=drafted)
+            pictures = Beside(show, "drawing the pictures")
             # The paper tells the verdict, which a drape gives.
-            if vertices < _MANY and settings.drape is None:
-                beside.enter_context(pattern)
+            pattern = Beside(partial(_write_pattern, plan, sizes, folder, draw), "drafting the pattern")
+            if vertices < _MANY:
+                beside.enter_context(pictures)
+                if settings.drape is None:
+                    beside.enter_context(pattern)
 
         files = list(film.files)
         draped: dict[str, Any] = {}
@@ -199,6 +206,7 @@ def _run(
                 )
                 files = list(dict.fromkeys([*drape_files, *files]))
                 sizes[plan.size] = replace(sizes[plan.size], drape=draped["drape"])
+                draw.cache_clear()
         # What is ready is packed for the review while other processes write.
         page, reviewed = folder / "review.html", output.picture and output.review
         packed: Mapping[str, Any] | None = None
@@ -244,18 +252,43 @@ def _run(
     )
 
 
-def _drafted(plan: Plan, garment: Garment) -> list[DraftedOutline]:
+def _in_order(plan: Plan, garments: Mapping[str, Garment]) -> dict[str, Garment]:
+    """Return the sizes of a garment as the scene has them, or as the tables do where the scene leaves out the mannequin's own."""
+    wanted = list(dict.fromkeys(plan.scene.settings.pattern.sizes))
+    if garments.keys() != set(wanted):
+        names = size_names()
+        wanted = sorted(garments, key=lambda size: (names.index(size) if size in names else len(names), size))
+    return {size: garments[size] for size in wanted}
+
+
+def _draw_once(plan: Plan, sizes: Mapping[str, Garment]) -> Draw:
+    """Return a function that draws the pattern for all who show it: film, pictures and paper; it remembers what it has drawn."""
+
+    @cache
+    def draw() -> tuple[Pattern, tuple[str, ...]]:
+        from warpflat.garment import pattern_of_garment
+
+        heard = list[LeftOut]()
+        with listening_to_left_out(heard.append):
+            pattern, notes = pattern_of_garment(
+                sizes, name=plan.scene.name, rules=plan.drawing.rules, sample_size=plan.size,
+                cloth_width=plan.drawing.cloth_width,
+            )  # fmt: skip
+        found = () if plan.found is None else plan.found.seams
+        return replace(pattern, found_seams=tuple(found)), (*notes, *(step.note for step in heard))
+
+    return draw
+
+
+def _drafted(plan: Plan, garment: Garment, draw: Draw) -> list[DraftedOutline]:
     """Return the pieces that finishing and pockets add, and where those of a form are worn."""
-    from warpflat.garment import pattern_of_garment
     from warpflat.pattern import DraftedOutline
 
     drafted = list[DraftedOutline]()
     if not (garment.finishing or garment.pockets):
         return drafted
     with optional_step("the picture is without what finishing and pockets add", is_needed=False):
-        pattern, _ = pattern_of_garment(
-            {"": garment}, name=garment.name, rules=plan.drawing.rules, cloth_width=plan.drawing.cloth_width
-        )
+        pattern, _ = draw()
         worn: Mapping[str, Sequence[Surface]] = {}
         with optional_step("drafted pieces are not shown on the body", is_needed=False):
             worn = plan.place_drafted(garment, pattern)
@@ -264,7 +297,7 @@ def _drafted(plan: Plan, garment: Garment) -> list[DraftedOutline]:
                 name=piece.printed_name + (f", {piece.quantity} times" if piece.quantity > 1 else ""),
                 points=piece.outline, worn=worn.get(piece.name, ()),
             )
-            for piece in pattern.pieces[""]
+            for piece in pattern.pieces[plan.size]
             if piece.name not in garment.pieces
         ]  # fmt: skip
     return drafted
@@ -290,19 +323,10 @@ def _measure_fit(
     return measured, advised.notes, remedies, files
 
 
-def _draft(plan: Plan, sizes: Mapping[str, Garment], folder: Path) -> WrittenPattern:
+def _write_pattern(plan: Plan, sizes: Mapping[str, Garment], folder: Path, draw: Draw) -> WrittenPattern:
     """Write the files of the pattern in all sizes, and the picture of a form's seams, which is among the files that are returned."""
-    scene, wanted = plan.scene, plan.scene.settings.pattern.sizes
-    if set(sizes) == set(wanted):
-        order = list(dict.fromkeys(wanted))
-    else:  # as the tables have them where the scene leaves out the mannequin's own
-        names = size_names()
-        order = sorted(sizes, key=lambda size: (names.index(size) if size in names else len(names), size))
-    garments = {size: sizes[size] for size in order}
-    found = () if plan.found is None else plan.found.seams
-    pattern = garment_files(
-        garments, folder, name=scene.name, options=plan.drawing, sample_size=plan.size, found_seams=found
-    )
+    scene = plan.scene
+    pattern = garment_files(sizes, folder, name=scene.name, options=plan.drawing, draw=draw)
     if plan.mannequin is None or not (scene.settings.output.picture and pattern.walked):
         return pattern
     files = list(pattern.files)

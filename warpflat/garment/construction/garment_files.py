@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from warpflat.flat import Flattening
     from warpflat.garment.construction.details import SeamTable
     from warpflat.garment.construction.garment import Garment
-    from warpflat.pattern import FoundSeam, Pattern
+    from warpflat.pattern import Pattern
 
 __all__ = ["garment_files", "surface_files"]
 
@@ -32,8 +33,7 @@ def garment_files(
     *,
     name: str,
     options: PatternOptions | None = None,
-    sample_size: str | None = None,
-    found_seams: Sequence[FoundSeam] = (),
+    draw: Callable[[], tuple[Pattern, tuple[str, ...]]] | None = None,
 ) -> WrittenPattern:
     """Write the pattern of a garment; on a form in one or more sizes, of which several lie upon each other as a nest.
 
@@ -45,8 +45,7 @@ def garment_files(
         folder: created if it does not exist.
         name: of the files.
         options: formats, rules and cloth.
-        sample_size: the one that the files show first.
-        found_seams: of a garment whose seams were found; their prices are printed.
+        draw: returns the pattern of the garments, and notes on it, as :func:`pattern_of_garment`, which does so otherwise.
 
     Raises:
         InputError: a printed name is for no piece, an unknown format, or the folder cannot be written.
@@ -58,11 +57,13 @@ def garment_files(
     if isinstance(first, FormGarment):
         check_names(options.names, first.parts)
 
+    draw = draw or partial(
+        pattern_of_garment, garments, name=name, rules=options.rules, cloth_width=options.cloth_width
+    )
+
     def make() -> tuple[Pattern, tuple[str, ...]]:
-        pattern, notes = pattern_of_garment(
-            garments, name=name, rules=options.rules, sample_size=sample_size, cloth_width=options.cloth_width
-        )
-        made.append(_with_linings(replace(pattern, found_seams=tuple(found_seams)), options, Path(folder)))
+        pattern, notes = draw()
+        made.append(_with_linings(pattern, options, Path(folder)))
         return made[0], notes
 
     written = write_pattern(make, folder, name=name, options=options)

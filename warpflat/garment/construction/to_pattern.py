@@ -270,13 +270,14 @@ def _drawn_on_forms(
         rules = replace(rules, ease={**ease, **rules.ease, **{seam: ease[seam] for seam in eased}}, eased=eased)
     plans = {size: plan_form(garment.form, rules) for size, garment in garments.items()}
     plan = next(iter(plans.values()))
-    # Relaxation keeps a piece upright, but not in its place: the lower ends of its datum lie on each other in all sizes.
-    laid, there = dict[str, FormGarment](), sample.evened()
+    # Relaxation keeps a piece upright, but not in its place: the lower ends of its datum lie where the sample size has them.
+    still = garments.get(sample_size or "", sample)
+    laid, there = dict[str, FormGarment](), still.evened()
     for size, garment in garments.items():
         moved = {}
         for piece, even in garment.evened().items():
             flat = garment.pieces[piece]
-            offset = there[piece][sample.pieces[piece].datum[0]] - even[flat.datum[0]]
+            offset = there[piece][still.pieces[piece].datum[0]] - even[flat.datum[0]]
             moved[piece] = replace(flat, positions=np.round(even + offset, _DECIMALS))
         laid[size] = replace(garment, pieces=moved)
     # Half pieces whose fold strays from straight in some size, and by how much [m] at most.
