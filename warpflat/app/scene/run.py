@@ -182,17 +182,20 @@ def _run(
                     )
             require_open_darts(scene, graded.values())
             sizes = _in_order(plan, {**graded, plan.size: garment})
-            draw = _draw_once(plan, sizes)
-            drafted = _drafted(plan, garment, draw) if filmed or output.picture else []
+            draw, drawn = _draw_once(plan, sizes), None
+            if (filmed or output.picture) and (garment.finishing or garment.pockets):
+                with optional_step("the picture is without what finishing and pockets add", is_needed=False):
+                    drawn, _ = draw()
+            pattern = Beside(partial(_write_pattern, plan, sizes, folder, draw), "drafting the pattern")
+            # The paper tells the verdict, which a drape gives.
+            if vertices < _MANY and settings.drape is None:
+                beside.enter_context(pattern)
+            drafted = [] if drawn is None else _drafted(plan, garment, drawn)
             film.drafted = [copy for piece in drafted for copy in piece.worn]
             show = partial(garment.write_files, folder, picture=output.picture, drafted=drafted)
             pictures = Beside(show, "drawing the pictures")
-            # The paper tells the verdict, which a drape gives.
-            pattern = Beside(partial(_write_pattern, plan, sizes, folder, draw), "drafting the pattern")
             if vertices < _MANY:
                 beside.enter_context(pictures)
-                if settings.drape is None:
-                    beside.enter_context(pattern)
 
         files = list(film.files)
         draped: dict[str, Any] = {}
@@ -280,27 +283,21 @@ def _draw_once(plan: Plan, sizes: Mapping[str, Garment]) -> Draw:
     return draw
 
 
-def _drafted(plan: Plan, garment: Garment, draw: Draw) -> list[DraftedOutline]:
+def _drafted(plan: Plan, garment: Garment, pattern: Pattern) -> list[DraftedOutline]:
     """Return the pieces that finishing and pockets add, and where those of a form are worn."""
     from warpflat.pattern import DraftedOutline
 
-    drafted = list[DraftedOutline]()
-    if not (garment.finishing or garment.pockets):
-        return drafted
-    with optional_step("the picture is without what finishing and pockets add", is_needed=False):
-        pattern, _ = draw()
-        worn: Mapping[str, Sequence[Surface]] = {}
-        with optional_step("drafted pieces are not shown on the body", is_needed=False):
-            worn = plan.place_drafted(garment, pattern)
-        drafted = [
-            DraftedOutline(
-                name=piece.printed_name + (f", {piece.quantity} times" if piece.quantity > 1 else ""),
-                points=piece.outline, worn=worn.get(piece.name, ()),
-            )
-            for piece in pattern.pieces[plan.size]
-            if piece.name not in garment.pieces
-        ]  # fmt: skip
-    return drafted
+    worn: Mapping[str, Sequence[Surface]] = {}
+    with optional_step("drafted pieces are not shown on the body", is_needed=False):
+        worn = plan.place_drafted(garment, pattern)
+    return [
+        DraftedOutline(
+            name=piece.printed_name + (f", {piece.quantity} times" if piece.quantity > 1 else ""),
+            points=piece.outline, worn=worn.get(piece.name, ()),
+        )
+        for piece in pattern.pieces[plan.size]
+        if piece.name not in garment.pieces
+    ]  # fmt: skip
 
 
 def _measure_fit(
