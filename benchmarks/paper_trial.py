@@ -300,7 +300,7 @@ def sew(garment: DraftedGarment, size: str, cuts: list[Cut]) -> list[tuple[str, 
     pieces = {piece.name: piece for piece in garment.pieces[size]}
     found = {name: find_piece(cuts, piece) for name, piece in pieces.items()}
     rows = []
-    for seam in garment.garment.seams:
+    for seam in garment.pattern.seams:
         first, second = (PrintedSide(side, found, pieces) for side in seam.sides)
         gap = second.length - first.length * (1 + seam.ease)
         worst = 0.0
@@ -316,7 +316,7 @@ def try_pattern(pattern: Path, pdf: Path | None = None, paper: str = "A4") -> tu
     from warpflat.pattern.export.pdf import write_pdf
 
     garment = read_pattern_json(pattern)
-    size = garment.garment.sample
+    size = garment.pattern.sample
     with tempfile.TemporaryDirectory() as folder:
         if pdf is None:
             pdf = Path(folder) / "pattern.pdf"

@@ -54,7 +54,7 @@ def variants(offer: GarmentOffer, *, options: bool) -> Iterator[dict[str, str]]:
 
 def edges_left(garment: DraftedGarment, size: str, steps: list[SewingStep]) -> int:
     """Return how many edges no seam joins and no step finishes; those that are left raw, or to the maker, are among them."""
-    joined = {side.place for seam in garment.garment.seams for side in seam.stretches}
+    joined = {side.place for seam in garment.pattern.seams for side in seam.stretches}
     joined |= {(piece, other_side(edge)) for piece, edge in joined}
     used = {place for step in steps if step.technique not in ("raw", "bind_raw") for place in step.finished}
     every = {(p.name, e.name) for p in garment.pieces[size] for e in p.edges if e.kind not in ("fold", "dart")}
@@ -69,7 +69,7 @@ def sewn_too_late(garment: DraftedGarment, size: str, steps: list[SewingStep]) -
         at = edges[side.piece].index(side.edge) + (end != side.reversed)
         return side.piece, side.mirrored, side.copy, at % len(edges[side.piece])
 
-    seams, number = garment.garment.seams, dict[str, int]()
+    seams, number = garment.pattern.seams, dict[str, int]()
     for at, step in enumerate(steps):
         for seam in seams:
             if all(side.edge in step.sewn.get(side.piece, ()) for side in seam.stretches):

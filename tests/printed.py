@@ -19,7 +19,7 @@ ON_BORDER = 2e-4
 
 def drawn_faults(garment: DraftedGarment, paper: str = "A4") -> tuple[list[str], Tiling, list[tuple[Drawing, ...]]]:
     """Return what lies outside its piece, whole and as it is printed, and what no sheet shows whole; and the sheet, as `draw_sheet`."""
-    with printed_in(garment.garment.words):
+    with printed_in(garment.pattern.words):
         printed = halved(garment)
         found = [
             fault for kind in (garment, printed) for row in kind.pieces.values() for p in row for fault in _outside(p)

@@ -233,7 +233,7 @@ def _assert_every_edge_is_used_up_by_one_step(drafted: DraftedGarment) -> None:
     steps = sewing_steps(drafted, only_size(drafted))
     finished = [place for step in steps for place in step.finished]
     assert len(finished) == len(set(finished))
-    joined = {side.place for seam in drafted.garment.seams for side in seam.stretches}
+    joined = {side.place for seam in drafted.pattern.seams for side in seam.stretches}
     assert not joined & set(finished)
     every = {
         (piece.name, edge.name)
@@ -265,16 +265,16 @@ def _assert_a_seam_comes_after_those_that_end_on_its_line(drafted: DraftedGarmen
 
     number = {}
     for at, step in enumerate(sewing_steps(drafted, only_size(drafted))):
-        for seam in drafted.garment.seams:
+        for seam in drafted.pattern.seams:
             places = [side.place for side in seam.stretches]
             if seam.name not in number and all(edge in step.sewn.get(piece, ()) for piece, edge in places):
                 number[seam.name] = at
     ends = {
         frozenset(corner(row[0 if not end else -1], end=end) for row in seam.sides): seam.name
-        for seam in drafted.garment.seams
+        for seam in drafted.pattern.seams
         for end in (False, True)
     }
-    for seam in drafted.garment.seams:
+    for seam in drafted.pattern.seams:
         for row in seam.sides:
             for one, other in pairwise(row):
                 crossing = ends.get(frozenset((corner(one, end=True), corner(other, end=False))))
@@ -302,7 +302,7 @@ class Misses(dict[str, str]):
 
 def _assert_every_printed_word_is_german(drafted: DraftedGarment) -> None:
     size, words = only_size(drafted), Misses(language_words("de"))
-    garment = replace(drafted, garment=replace(drafted.garment, words=words))
+    garment = replace(drafted, pattern=replace(drafted.pattern, words=words))
     with printed_in(words):
         steps = sewing_steps(garment, size)
         notions(steps)
@@ -326,8 +326,8 @@ def _assert_lengths(drafted: DraftedGarment, wanted: Mapping[str, tuple[float, f
         back, band = pieces["back"], 0.5 * pieces["hip_band"].edge("left end").length
         (fold,) = [edge.line for edge in back.edges if edge.kind == "fold"] or [back.internal_lines["centre back"]]
         assert lengths["length at the centre back"] == pytest.approx(polyline_length(fold) + band, abs=1e-3)
-    if drafted.garment.worn is not None and "hem at the hip" in lengths:
-        (hip,) = [each for each in drafted.garment.worn.measures[size] if each.name == "hip"]
+    if drafted.pattern.worn is not None and "hem at the hip" in lengths:
+        (hip,) = [each for each in drafted.pattern.worn.measures[size] if each.name == "hip"]
         assert lengths["hem at the hip"] == pytest.approx(hip.finished, abs=0.015)
 
 

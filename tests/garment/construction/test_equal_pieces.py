@@ -67,7 +67,7 @@ def test_gores_that_are_equal_are_cut_from_one_and_all_their_seams_are_told() ->
     assert sewn_seams(sewing_steps(drafted, ""))[0].count == 6
     assert notches["edge 0"].at == pytest.approx(notches["edge 1"].at * [-1.0, 1.0], abs=4e-4)
     # Files tell all of it again, and what is sewn has all six.
-    assert list(pattern_from_json(pattern_json(drafted)).garment.seams) == list(pattern.seams)
+    assert list(pattern_from_json(pattern_json(drafted)).pattern.seams) == list(pattern.seams)
     words = [(*edge, text) for edge, row in seam_words(pattern.seams).items() for text in row]
     assert {seam.name: seam.sides for seam in seams_of_words(words)} == {s.name: s.sides for s in pattern.seams}
     whole, seams, _ = whole_pieces(pattern.pieces[""], pattern.seams)
@@ -122,7 +122,7 @@ def test_prices_of_seams_are_printed_and_kept_in_the_file(tmp_path: Path) -> Non
     ]
     pattern = replace(ball([gore(k) for k in range(3)]), found_seams=found)
     drafted = draft_garment(pattern)
-    assert pattern_from_json(pattern_json(drafted)).garment.found_seams == found
+    assert pattern_from_json(pattern_json(drafted)).pattern.found_seams == found
     write_pdf(drafted, tmp_path / "pattern.pdf")
     text = "\n".join(page.extract_text() for page in PdfReader(tmp_path / "pattern.pdf").pages)
     assert re.search(

@@ -188,7 +188,7 @@ def test_the_command_parts_a_garment_sews_it_and_draws_mirrored_pieces_once(tmp_
     assert pieces["left_sleeve"].quantity == 2
     assert pieces["left_sleeve"].paired
     # All of the right sleeve's seams are there, at the left one's edges.
-    sides = [side for seam in pattern.garment.seams for side in seam.stretches]
+    sides = [side for seam in pattern.pattern.seams for side in seam.stretches]
     assert sum(side.mirrored for side in sides) == sum(
         side.piece == "left_sleeve" and not side.mirrored for side in sides
     )

@@ -43,7 +43,7 @@ def test_halves_lie_against_the_fold_and_pairs_are_cut_at_once(dress):
 
 
 def test_matched_seams_lie_on_the_same_stripe(dress):
-    name = next(seam.name for seam in dress.garment.seams if "side" in seam.name and len(seam.sides[0]) == 1)
+    name = next(seam.name for seam in dress.pattern.seams if "side" in seam.name and len(seam.sides[0]) == 1)
     repeat = np.array([0.06, 0.045])
     stripes = Stripes(warp=repeat[0], weft=repeat[1], seams=(name,))
     marker = make_marker(dress, Cloth(width=1.5, stripes=stripes))

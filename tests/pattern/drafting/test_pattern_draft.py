@@ -89,7 +89,7 @@ def test_a_seam_that_does_not_match_is_reported():
 
 def test_notches_stand_at_the_same_length_on_both_sides_of_every_seam(dress):
     for size, pieces in dress.pieces.items():
-        for seam, report in zip(dress.garment.seams, (r for r in dress.seams if r.size == size), strict=True):
+        for seam, report in zip(dress.pattern.seams, (r for r in dress.seams if r.size == size), strict=True):
             sides = []
             for side, total in zip(seam.sides, report.length_mm, strict=True):
                 on_side = {s.place for s in side}
@@ -182,7 +182,7 @@ def test_a_back_is_told_by_where_it_is_worn_as_by_its_name(at: str) -> None:
 
 
 def test_curves_keep_corners_and_stay_within_a_tenth_of_a_millimetre(dress):
-    for piece in draft_garment(dress.garment, sizes=("38",), true=False).pieces["38"]:
+    for piece in draft_garment(dress.pattern, sizes=("38",), true=False).pieces["38"]:
         for edge in piece.edges:
             points = edge.edge.points @ piece.frame[:, :2].T + piece.frame[:, 2]
             assert np.abs(edge.line[[0, -1]] - points[[0, -1]]).max() < 1e-12
@@ -664,12 +664,12 @@ def test_a_piece_that_cannot_be_drawn_costs_itself_and_its_seams(monkeypatch: py
     with listening_to_left_out(heard.append):
         drafted = draft_garment(Pattern(name="row", pieces={"": [square(name) for name in names]}, seams=seams))
     assert drafted.piece_names == ("left", "right", "other")
-    assert [seam.name for seam in drafted.garment.seams] == ["right to other"]
+    assert [seam.name for seam in drafted.pattern.seams] == ["right to other"]
     (note,) = (each.note for each in heard)
     assert note.startswith("middle was left out of the pattern: its lines lie over each other as they are drawn")
     assert "This can" not in note
     with pytest.raises(InputError, match="none of the pieces"):
-        drafted.garment.without(["left", "right", "other"])
+        drafted.pattern.without(["left", "right", "other"])
 
 
 def test_edges_that_cross_once_they_are_drawn_keep_to_their_layout():

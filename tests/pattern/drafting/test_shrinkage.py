@@ -37,5 +37,5 @@ def test_a_half_is_as_wide_as_the_half_of_the_whole_piece():
 
 
 def test_the_pattern_of_a_file_is_as_large_as_it_was():
-    read = pattern_from_json(pattern_json(skirt(0.05))).garment
+    read = pattern_from_json(pattern_json(skirt(0.05))).pattern
     assert np.ptp(read.pieces[""][0].outline, axis=0) == pytest.approx([0.5, 0.6])

@@ -298,7 +298,7 @@ def test_a_pattern_comes_back_with_its_lengths_and_seams(tmp_path: Path):
         replace(each.piece, edges=[replace(edge.edge, points=edge.line) for edge in each.edges])
         for each in drafted.pieces[""]
     ]
-    pieces, seams, _ = whole_pieces(flat, drafted.garment.seams)
+    pieces, seams, _ = whole_pieces(flat, drafted.pattern.seams)
     assert {piece.name for piece in found.pieces[""]} == {"front", "back", "sleeve", "sleeve mirrored"}
     for name, piece in pieces.items():
         lengths = {edge.name: edge.length for edge in found.piece(name, "").edges}
@@ -448,7 +448,7 @@ def test_patterns_of_garmentcode_are_drafted(name: str, seams: int, darts: int):
     file = Path(DATA) / "patterns" / f"{name}.json"
     given = json.loads(file.read_text())["pattern"]
     drafted = read_drafted(file)
-    read = drafted.garment
+    read = drafted.pattern
     assert len(read.seams) == seams
     assert sum(len(piece.darts) for piece in read.pieces[""]) == darts
     stitched = sum(max(map(len, seam.sides)) for seam in read.seams) + darts

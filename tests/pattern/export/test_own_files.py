@@ -51,7 +51,7 @@ def test_pattern_json_keeps_how_seams_are_sewn_and_notched_and_the_notes():
         "front_1.e1", "front_2.e3", "cf", as_laid=True, double=True, notches=(0.25, 0.5), size_notches={"": (0.3,)}
     )
     given = Pattern(name="p", pieces={"": fronts}, seams=[seam], notes=["the file says so"])
-    read = pattern_from_json(pattern_json(draft_garment(given))).garment
+    read = pattern_from_json(pattern_json(draft_garment(given))).pattern
     assert read.seams == [seam]
     assert list(read.notes) == given.notes
 

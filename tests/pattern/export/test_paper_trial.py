@@ -23,7 +23,7 @@ def test_printed_seams_close_and_notches_meet(tmp_path):
     rows, pieces, sheets = try_pattern(tmp_path / "pattern.json")
     assert pieces == len(dress.pieces["38"])
     assert sheets > 1
-    assert len(rows) == len(dress.garment.seams)
+    assert len(rows) == len(dress.pattern.seams)
     assert sum(notches for *_, notches in rows) > 0
     for name, gap, missed, _ in rows:
         assert abs(gap) < 0.5, name

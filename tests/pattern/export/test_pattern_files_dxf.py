@@ -113,7 +113,7 @@ def test_sewing_lines_and_mirror_line_keep_their_names(dress, file):
     (piece,) = (p for p in dress.pieces["38"] if p.name == "front bodice")
     block = document.blocks.get("FRONT_BODICE_38")
     named = {t.dxf.text for t in block.query('TEXT[layer=="15"]')}
-    sewn = {f"SEAM: {w}" for (p, _), rows in seam_words(dress.garment.seams).items() if p == piece.name for w in rows}
+    sewn = {f"SEAM: {w}" for (p, _), rows in seam_words(dress.pattern.seams).items() if p == piece.name for w in rows}
     assert sewn
     assert piece.internal_lines
     inner = {f"LINE: {name}" for name in piece.internal_lines} | {f"DART: {d.dart.name}" for d in piece.darts}

@@ -49,7 +49,7 @@ def test_labels_and_steps_say_the_printed_name_in_the_asked_units(dress: Drafted
     steps = " ".join(step.words for step in sewing_steps(dress, "38"))
     assert "Vorderteil" in steps
     assert whole.name not in steps.replace("Vorderteil", "").split(" ")
-    assert dress.garment.units == "in"
+    assert dress.pattern.units == "in"
 
 
 def test_files_carry_the_printed_name_and_keep_the_key(dress: DraftedGarment, tmp_path: Path):

@@ -110,7 +110,7 @@ def draft_garment(
                 replace(piece, notches=piece.notches + tuple(notches.get(name, ()))) for name, piece in pieces.items()
             )
             reports += seam_reports(seams, {piece.name: piece for piece in drafted[size]}, size)
-        return DraftedGarment(garment=garment, pieces=drafted, seams=tuple(reports), corners=tuple(corners))
+        return DraftedGarment(pattern=garment, pieces=drafted, seams=tuple(reports), corners=tuple(corners))
 
 
 def draft_half(

@@ -184,7 +184,7 @@ class DraftedGarment:
     """A garment ready for the cutting table.
 
     Attributes:
-        garment: as it came in.
+        pattern: as it came in.
         pieces: by size.
         seams: how well the two sides of every seam agree.
         corners: where edges run on across seams, darts and folds, before and after truing.
@@ -192,19 +192,19 @@ class DraftedGarment:
 
     __repr__ = short_repr
 
-    garment: Pattern
+    pattern: Pattern
     pieces: Mapping[str, tuple[DraftedPiece, ...]]
     seams: tuple[SeamReport, ...]
     corners: tuple[CornerReport, ...] = ()
 
     @property
     def name(self) -> str:
-        return self.garment.name
+        return self.pattern.name
 
     @property
     def sample(self) -> str:
         """Size that is shown where only one is; the first where the sample size is not drafted."""
-        return self.garment.sample if self.garment.sample in self.pieces else next(iter(self.pieces))
+        return self.pattern.sample if self.pattern.sample in self.pieces else next(iter(self.pieces))
 
     @property
     def piece_names(self) -> tuple[str, ...]:

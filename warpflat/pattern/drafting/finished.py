@@ -93,7 +93,7 @@ def _band_at(
     """Return the width [m] of a cuff, a band or a flounce that is sewn to a piece at one of its points; None if there is none."""
     import shapely
 
-    for seam in garment.garment.seams:
+    for seam in garment.pattern.seams:
         for own, other in (seam.sides, seam.sides[::-1]):
             band = drafted[other[0].piece].piece
             if band.role not in ("strip", "cuff", "waistband") and not is_flounce(band):

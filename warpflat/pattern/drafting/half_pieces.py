@@ -36,7 +36,7 @@ def halved(garment: DraftedGarment) -> DraftedGarment:
     for name in garment.piece_names:
         sizes = garment.all_sizes(name)
         if all(float(np.ptp(p.cut_line[:, 0])) >= NARROW and is_symmetric(p) for p in sizes):
-            side = _kept_side(sizes[0], garment.garment.seams)
+            side = _kept_side(sizes[0], garment.pattern.seams)
             with optional_step(f"{name} is printed whole, not as a half on the fold", is_needed=False):
                 halves[name] = [resized(_half(as_worn(p), garment, side), np.array(p.enlarged)) for p in sizes]
     pieces = {
@@ -186,7 +186,7 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
     )
     # Each notch moves with the half, on which it gets the nearest edge.
     notches = []
-    for notch in _notches_beside(piece, garment.garment.seams, names, axis, side):
+    for notch in _notches_beside(piece, garment.pattern.seams, names, axis, side):
         at, bases, slit = notch.at + shift, [base + shift for base in notch.base], notch.direction
         place = shapely.Point(at)
         nearest = min(moved, key=lambda edge: float(shapely.LineString(edge.line).distance(place)))

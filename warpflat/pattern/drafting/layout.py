@@ -63,7 +63,7 @@ def nests(garment: DraftedGarment, sizes: Sequence[str] | None = None) -> list[t
         InputError: an unknown size.
     """
     for size in sizes or ():
-        garment.garment.check_size(size)
+        garment.pattern.check_size(size)
     rows = (garment.all_sizes(name) for name in garment.piece_names)
     chosen = (tuple(piece for piece in row if sizes is None or piece.size in sizes) for row in rows)
     return [row for row in chosen if row]

@@ -177,7 +177,7 @@ def make_marker(
         placements = min((_nest(garment.name, plan, cloth, share) for plan in tries), key=_length)
     # In the order in which the cutter meets them.
     placements = sorted(placements, key=lambda copy: tuple(copy.cut_line.min(axis=0)))
-    with printed_in(garment.garment.words):
+    with printed_in(garment.pattern.words):
         # Each gets its name in the room between its lines.
         for number, copy in enumerate(placements):
             piece = copy.piece

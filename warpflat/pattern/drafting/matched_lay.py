@@ -42,7 +42,7 @@ class Stripes:
         Raises:
             InputError: it lacks one; gives the nearest.
         """
-        known = [seam.name for seam in garment.garment.seams]
+        known = [seam.name for seam in garment.pattern.seams]
         for name in self.seams:
             if name not in known:
                 raise InputError(f"match: no seam {name!r}; {nearest(name, known)}")
@@ -147,7 +147,7 @@ def _matched_points(
     copies: Sequence[Laid], seams: Sequence[str], garment: DraftedGarment
 ) -> list[dict[int, FloatArray]]:
     """Return for each seam at whose place stripes meet the copies that it joins, each with that place, as the cloth is directed [m]."""
-    known = {seam.name: seam for seam in garment.garment.seams}
+    known = {seam.name: seam for seam in garment.pattern.seams}
     points = []
     for name in seams:
         joined: dict[int, FloatArray] = {}

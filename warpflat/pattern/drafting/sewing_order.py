@@ -181,7 +181,7 @@ def tools(garment: DraftedGarment, steps: Sequence[SewingStep]) -> str:
     used = {techniques()[step.technique].get("tool") for step in steps}
     needed = ["paper scissors and glue or tape", "cloth scissors", "tape measure", "chalk", "pins", "iron"]
     needed += ["sewing machine", "hand needle", *(tool for tool in ("zip foot", "buttonhole foot") if tool in used)]
-    if garment.garment.worn is not None and garment.garment.worn.knits:
+    if garment.pattern.worn is not None and garment.pattern.worn.knits:
         needed.append("needle and stitch for knits")
     return ", ".join(translate(word) for word in needed)
 

@@ -93,14 +93,14 @@ class SewingTasks:
     """
 
     def __init__(self, garment: DraftedGarment, size: str) -> None:
-        self.size, self.units = size, garment.garment.units
+        self.size, self.units = size, garment.pattern.units
         self.drafted = {piece.name: piece for piece in garment.pieces[size]}
         # Whole ones, also where halves on the fold are printed.
-        self.pieces = {piece.name: piece for piece in garment.garment.pieces[size]}
+        self.pieces = {piece.name: piece for piece in garment.pattern.pieces[size]}
         self.titles = piece_titles(list(self.pieces.values()))
-        self.seams = garment.garment.seams
+        self.seams = garment.pattern.seams
         self.sewn = {side.place for seam in self.seams for side in seam.stretches}
-        self.above = "right" if garment.garment.worn is None else garment.garment.worn.buttonholes
+        self.above = "right" if garment.pattern.worn is None else garment.pattern.worn.buttonholes
         self.order = {name: [edge.name for edge in piece.edges] for name, piece in self.pieces.items()}
         self.lengths = {report.name: report.length_mm for report in garment.seams if report.size == size}
         # Seams that are each other's mirror images are sewn alike.
@@ -151,7 +151,7 @@ class SewingTasks:
                 seam = replace(task.seams[0], name=name, openings=())
                 self.tasks.append(Task(technique=self._technique([seam]), seams=[seam], like=task))
                 self.lengths[name] = self.lengths[task.seams[0].name]
-        self._finish(garment.garment.elastics)
+        self._finish(garment.pattern.elastics)
 
     def stands_for_both(self, group: Sequence[Seam]) -> bool:
         """Return whether a seam of halves on the fold, or of pairs, is sewn on both sides of the body."""

@@ -30,11 +30,11 @@ class WalkedSeam:
 
 def walk_seams(drafted: DraftedGarment) -> tuple[WalkedSeam, ...]:
     """Walk every seam of a drafted garment, in all its sizes."""
-    reports, groups = {(seam.name, seam.size): seam for seam in drafted.seams}, copied_together(drafted.garment.seams)
+    reports, groups = {(seam.name, seam.size): seam for seam in drafted.seams}, copied_together(drafted.pattern.seams)
     walked = []
     for size, row in drafted.pieces.items():
         pieces: dict[str, DraftedPiece] = {piece.name: piece for piece in row}
-        for seam in drafted.garment.seams:
+        for seam in drafted.pattern.seams:
             lines = [SeamLine(side, pieces) for side in seam.sides]
             # The edges of the first side as one line, each running on from the one before, piece to the left.
             joined = np.zeros((0, 2))

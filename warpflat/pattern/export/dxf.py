@@ -77,10 +77,10 @@ def write_dxf(
         raise InputError(f"unknown DXF units {units!r}; {nearest(units, UNITS)}")
     chosen = tuple(garment.pieces) if sizes is None else tuple(sizes)
     scale, created = UNITS[units], source_date()
-    sample = garment.garment.sample if garment.garment.sample in chosen else chosen[0]
+    sample = garment.pattern.sample if garment.pattern.sample in chosen else chosen[0]
     rules = grade_rules(garment, chosen, sample) if rul is not None and len(chosen) > 1 else None
     blocks, space, taken = list[str](), list[str](), set[str]()
-    seams = seam_words(garment.garment.seams)
+    seams = seam_words(garment.pattern.seams)
     names = {piece.name: piece.piece.title or piece.name for row in garment.pieces.values() for piece in row}
     written = titles(list(dict.fromkeys(names.values())), lambda name: any(map(str.isalnum, _ascii(name))))
     for placed in lay_out(nests(garment, chosen)).placed:

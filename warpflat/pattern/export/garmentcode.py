@@ -57,8 +57,8 @@ def garmentcode_json(garment: DraftedGarment, *, size: str | None = None) -> tup
     Raises:
         InputError: an unknown size, or a piece that cannot be unfolded.
     """
-    chosen = garment.garment.sample if size is None else size
-    garment.garment.check_size(chosen)
+    chosen = garment.pattern.sample if size is None else size
+    garment.pattern.check_size(chosen)
     left_out = [
         f"{piece.name}: GarmentCode knows no {what}: {', '.join(names)} left out"
         for piece in garment.pieces[chosen]
@@ -80,7 +80,7 @@ def garmentcode_json(garment: DraftedGarment, *, size: str | None = None) -> tup
                 placement=None if own.placement is None else own.placement @ np.linalg.inv(frame),
             )
         )
-    pieces, seams, _ = whole_pieces(drawn, garment.garment.seams, unsewn=True)
+    pieces, seams, _ = whole_pieces(drawn, garment.pattern.seams, unsewn=True)
     lines = {(name, edge.name): edge.points for name, piece in pieces.items() for edge in piece.edges}
     stitched, splits, notes = _stitched(pieces, seams, lines)
     left_out += notes

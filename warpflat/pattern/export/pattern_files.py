@@ -158,7 +158,7 @@ def export_patterns(
             "pattern.json holds all sizes, since the other formats are made from it: leave out the size, or take dxf, svg or pdf"
         )
     with _rewritten(source, out, allowance, units, over_itself="json" in formats) as (drafted, folder, name, files):
-        notes = list(drafted.garment.notes)
+        notes = list(drafted.pattern.notes)
         for format in formats:
             written, lost = _write(
                 drafted, folder, format, name=name, dialect=dialect, paper=paper, sizes=sizes, english=units == "in"
@@ -198,7 +198,7 @@ def lay_markers(
         files += marked
         if all("not_made" in plan for plan in plans):
             raise InputError(f"{source}: {plans[0]['not_made']}")
-    return [folder / file for file in files], [*drafted.garment.notes, *remarks], plans
+    return [folder / file for file in files], [*drafted.pattern.notes, *remarks], plans
 
 
 @contextmanager
@@ -310,7 +310,7 @@ def write_pattern(
         drafted = enlarged(drafted, options.shrinkage, next(iter(pattern)).fabric)
         near = [seam.local_mm for seam in drafted.seams if seam.local_mm is not None]
         edges = [edge for row in drafted.pieces.values() for piece in row for edge in piece.edges]
-        cloths = cut_list(drafted.pieces[drafted.garment.sample])
+        cloths = cut_list(drafted.pieces[drafted.pattern.sample])
         metrics: dict[str, Any] = {
             # How far curves stray from the mesh, and sides of seams from each other, at worst.
             "pattern": {

@@ -362,7 +362,7 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
     cut turned over, and "copy" its number, from 1 for the second. An edge's `point_lengths` are the lengths along its line at the
     points of its mesh's border, and `fit_error` is the largest distance of the curve from them. Numbers are not rounded.
     """
-    pattern, sample = garment.garment, next(iter(garment.pieces.values()))
+    pattern, sample = garment.pattern, next(iter(garment.pieces.values()))
     darts = [seam for piece in sample for seam in piece.piece.dart_seams]
     sizes = dict[str, dict[str, Any]]()
     for size, pieces in garment.pieces.items():
@@ -509,7 +509,7 @@ def pattern_from_json(data: Any) -> DraftedGarment:
             seams.append(_made(Seam, stitch, sides=(first, second)))
         reports = tuple(_made(SeamReport, report) for report in data.seams)
         garment = _made(Pattern, data, pieces=pieces, seams=seams)
-        return DraftedGarment(garment=garment, pieces=drafted, seams=reports)
+        return DraftedGarment(pattern=garment, pieces=drafted, seams=reports)
     except InputError as error:
         raise InputError(f"{error}; run the scene again") from None
 

@@ -83,12 +83,12 @@ def write_pdf(
     Raises:
         InputError: unknown paper or size.
     """
-    with printed_in(garment.garment.words):
+    with printed_in(garment.pattern.words):
         if paper not in PAPERS:
             raise InputError(f"unknown paper {paper!r}; {nearest(paper, PAPERS)}")
         chosen = tuple(garment.pieces) if sizes is None else tuple(sizes)
         for size in chosen:
-            garment.garment.check_size(size)
+            garment.pattern.check_size(size)
         whole = replace(garment, pieces={size: row for size, row in garment.pieces.items() if size in chosen})
         printed = halved(whole)
         if fault := too_many_sheets(printed, paper):
@@ -165,7 +165,7 @@ def draw_sheet(printed: DraftedGarment, paper: str) -> tuple[Tiling, list[tuple[
         placed.append(replace(place, pieces=tuple(upwards)))
     tiling, letters = replace(tiling, sheet=replace(sheet, placed=tuple(placed))), seam_letters(printed)
     sewn: dict[tuple[str, str], list[str]] = {}
-    for seam in printed.garment.seams:
+    for seam in printed.pattern.seams:
         for side in seam.stretches:
             sewn.setdefault(side.place, []).append(seam.name)
     drawings = []

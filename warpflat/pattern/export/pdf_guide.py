@@ -64,7 +64,7 @@ class _Page:
     def length(self, length: float, *, signed: bool = False) -> str:
         """Return a length [m] in words, in the units of the pattern."""
         sign = "" if not signed else "+" if length >= 0 else "-"
-        return sign + length_words(abs(length), self.garment.garment.units)
+        return sign + length_words(abs(length), self.garment.pattern.units)
 
     def need(self, height: float) -> bool:
         """Begin a new page if less than `height` [m] is left; return whether one began."""
@@ -126,7 +126,7 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
         paper: of the pages.
     """
     page = _Page(canvas, whole, paper)
-    pattern, size = whole.garment, whole.sample
+    pattern, size = whole.pattern, whole.sample
     pieces = printed.pieces[size]
     if pattern.worn is not None:
         _worn(page, pattern.worn, size, [each for each in printed.pieces if each in pattern.worn.measures])
@@ -386,7 +386,7 @@ def _thumbnail(
 def _cloth(page: _Page, whole: DraftedGarment) -> None:
     """Write how much cloth each size takes at the usual widths."""
     page.heading(translate("Cloth needed"), 3 * LINE)
-    units = whole.garment.units
+    units = whole.pattern.units
     head = ["", *(translate("{width} wide", width=cloth_words(width, units, of_width=True)) for width in WIDTHS)]
     needed = cloth_needed(whole)
     fabrics = dict.fromkeys(fabric for cloths in needed.values() for fabric in cloths)
@@ -398,7 +398,7 @@ def _cloth(page: _Page, whole: DraftedGarment) -> None:
             [", ".join(part for part in (translate_name(fabric), printed_size(size) if size else "") if part), *words]
         )
     page.table(head, rows, (0.34, 0.22, 0.22, 0.22))
-    for name, cloth in ({} if whole.garment.worn is None else whole.garment.worn.cloths).items():
+    for name, cloth in ({} if whole.pattern.worn is None else whole.pattern.worn.cloths).items():
         told = translate(
             f"a {cloth.kind} cloth of {{weight}} g/m2, which a hand's pull stretches by {{along}} % along and {{across}} % across",
             weight=round(1000 * cloth.weight),

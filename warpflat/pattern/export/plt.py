@@ -41,7 +41,7 @@ def write_plt(garment: DraftedGarment, path: str | os.PathLike[str], *, sizes: S
     """
     written: dict[int, list[str]] = {pen: [] for pen in (_MARKS, 2, 1)}
     for placed in lay_out(nests(garment, sizes)).placed:
-        with printed_in(garment.garment.words):
+        with printed_in(garment.pattern.words):
             drawings = draw_nest(placed.pieces)
         for drawing in drawings:
             for stroke in (stroke for stroke in drawing.strokes if not stroke.hidden):

@@ -37,7 +37,7 @@ def read_pattern(path: str | os.PathLike[str], *, allowance: float | None = None
     if ending in (".dxf", ".svg"):
         return (read_dxf if ending == ".dxf" else read_svg)(path, allowance=allowance)
     found = _read_json(Path(path))
-    return found.garment if isinstance(found, DraftedGarment) else found
+    return found.pattern if isinstance(found, DraftedGarment) else found
 
 
 def read_drafted(
@@ -64,7 +64,7 @@ def read_drafted(
             raise InputError(f"{path}: has allowances of its own; --allowance is for a pattern without")
         if units is None:
             return found
-        garment = _printed_in(found.garment, units)
+        garment = _printed_in(found.pattern, units)
         with printed_in(garment.words):
             rows = {
                 size: tuple(
@@ -72,7 +72,7 @@ def read_drafted(
                 )
                 for size, row in found.pieces.items()
             }
-        return replace(found, garment=garment, pieces=rows)
+        return replace(found, pattern=garment, pieces=rows)
     with guarded(Path(path), "pattern"):
         wide = {
             size: [

@@ -62,10 +62,10 @@ def write_svg(garment: DraftedGarment, path: str | os.PathLike[str], *, sizes: S
     """
     sheet = lay_out(nests(garment, sizes))
     page = SvgPage(float(sheet.size[0]), float(sheet.size[1]), garment.name)
-    seams = seam_words(garment.garment.seams)
+    seams = seam_words(garment.pattern.seams)
     drawn = [size for size in garment.pieces if sizes is None or size in sizes]
     for placed in sheet.placed:
-        with printed_in(garment.garment.words):
+        with printed_in(garment.pattern.words):
             drawings = draw_nest(placed.pieces)
         for drawing in drawings:
             shift = np.column_stack([np.eye(2), placed.offset])
