@@ -8,7 +8,7 @@ from .drafting.fairing import count_inflections as count_inflections
 from .drafting.fairing import fair_line as fair_line
 from .drafting.fairing import fairest_line as fairest_line
 from .drafting.fitting import drawn_length as drawn_length
-from .drafting.from_mesh import MEET as MEET
+from .drafting.from_mesh import BORDERS_MEET as BORDERS_MEET
 from .drafting.from_mesh import MeshFeatures as MeshFeatures
 from .drafting.from_mesh import line_labels as line_labels
 from .drafting.from_mesh import piece_from_mesh as piece_from_mesh

@@ -11,7 +11,7 @@ import numpy as np
 from warpflat.core import FloatArray
 from warpflat.flat import Surface, check_range, grid_surface, make_named
 from warpflat.garment import meet_borders
-from warpflat.pattern import MEET
+from warpflat.pattern import BORDERS_MEET
 
 __all__ = ["PIECES", "apron", "make_pieces", "sun_hat", "tote"]
 
@@ -138,7 +138,7 @@ def make_pieces(name: str, **parameters: Any) -> tuple[Surface, ...]:
     Raises:
         InputError: an unknown parameter (names the nearest), or one of the wrong kind or out of range.
     """
-    return tuple(meet_borders(make_named(name, PIECES[name], parameters), MEET)[0])
+    return tuple(meet_borders(make_named(name, PIECES[name], parameters), BORDERS_MEET)[0])
 
 
 def _piece(name: str, points: FloatArray, *free: str) -> Surface:

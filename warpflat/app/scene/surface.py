@@ -142,7 +142,7 @@ def scene_pieces(scene: Scene) -> tuple[Surface, ...] | None:
     """
     from warpflat.app.scene.first_shapes import PIECES, make_pieces
     from warpflat.garment import read_pieces
-    from warpflat.pattern import MEET
+    from warpflat.pattern import BORDERS_MEET
 
     table = scene.settings.surface
     if isinstance(table, ShapeSurface) and table.shape in PIECES:
@@ -150,7 +150,7 @@ def scene_pieces(scene: Scene) -> tuple[Surface, ...] | None:
             return make_pieces(table.shape, **(table.model_extra or {}))
     if not isinstance(table, FileSurface) or table.component != "all":
         return None
-    meet = MEET if table.meet_mm is None else 1e-3 * table.meet_mm
+    meet = BORDERS_MEET if table.meet_mm is None else 1e-3 * table.meet_mm
     return read_pieces(_file(scene, table), units=table.units, prim=table.prim, name=scene.name, meet=meet)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, IntArray, arc_lengths
 from warpflat.flat import Surface, area_vectors, border_loops, join_labels
-from warpflat.pattern import MEET
+from warpflat.pattern import BORDERS_MEET
 
 __all__ = ["SAME_PLACE", "meet_borders"]
 
@@ -29,7 +29,7 @@ _PAIR = 0.45
 _OFF_ENDS = 0.02
 
 
-def meet_borders(surfaces: Sequence[Surface], tolerance: float = MEET) -> tuple[list[Surface], list[str]]:
+def meet_borders(surfaces: Sequence[Surface], tolerance: float = BORDERS_MEET) -> tuple[list[Surface], list[str]]:
     """Return the surfaces with borders that agree vertex by vertex where they run along each other, and notes on what was done.
 
     Args:

@@ -27,7 +27,7 @@ from warpflat.flat import (
 )
 from warpflat.garment.construction.meet import meet_borders
 from warpflat.garment.construction.overlapping_layers import overlap_notes
-from warpflat.pattern import MEET
+from warpflat.pattern import BORDERS_MEET
 
 __all__ = ["make_piece_name", "object_parts", "read_pieces"]
 
@@ -38,7 +38,7 @@ def read_pieces(
     units: str | None = None,
     prim: str | None = None,
     name: str | None = None,
-    meet: float = MEET,
+    meet: float = BORDERS_MEET,
 ) -> tuple[Surface, ...]:
     """Read all pieces of a garment: each connected part of each object of an OBJ file, node of a GLB scene or mesh prim of a USD stage.
 

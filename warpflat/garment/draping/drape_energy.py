@@ -135,7 +135,7 @@ class DrapeEnergy:
         self._evaluate = Sequence([*self.evaluate_cells, gather])
         self.planes = []
         if body is not None:
-            ball = _BALL * float(np.sqrt(vertex_area.mean()))
+            ball = _BALL * cloth.mean_edge
             query = [wp.uint64(body.mesh.id), body.normals, x, _REACH, ball]
             outputs = [contact.centre, contact.normal, contact.ball]
             self.planes = [record(find_planes, dim=count, inputs=query, outputs=outputs, least=256, turns=4, **at)]

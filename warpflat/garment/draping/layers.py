@@ -42,7 +42,7 @@ class Layers:
     def __init__(self, cloth: SewnCloth, device: wp.Device) -> None:
         """Build the search tree of a cloth; no layer is near before `renew`."""
         self._surface, count = Body(cloth.designed, cloth.faces, device=device), len(cloth.designed)
-        self._holds = _HOLDS * float(np.sqrt(cloth.vertex_areas().mean()))
+        self._holds = _HOLDS * cloth.mean_edge
         near = cloth.laplacian()[0]
         self._near = [wp.array(each, dtype=wp.int32, device=device) for each in (near.indptr, near.indices)]
         piece = np.zeros(len(cloth.faces))

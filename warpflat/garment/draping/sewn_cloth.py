@@ -112,6 +112,11 @@ class SewnCloth:
         summed = np.bincount(corner.ravel(), np.repeat(area / 3.0, 3), minlength=len(self.designed))
         return summed.astype(np.float64)
 
+    @property
+    def mean_edge(self) -> float:
+        """Edge of squares that would share the flat area as the vertices do [m]."""
+        return float(np.sqrt(self.vertex_areas().mean()))
+
 
 class ClothPiece(NamedTuple):
     """A piece of cloth: #P by 2, flat [m]; #F by 4 faces; #P by 3, in space [m]; 2, its warp; lines by name, as vertices."""

@@ -18,10 +18,10 @@ from warpflat.pattern.drafting.placement import default_grain
 from warpflat.pattern.drafting.polygons import signed_area, upright
 from warpflat.pattern.files.output import optional_step
 
-__all__ = ["MEET", "MeshFeatures", "line_labels", "piece_from_mesh", "runs_without"]
+__all__ = ["BORDERS_MEET", "MeshFeatures", "line_labels", "piece_from_mesh", "runs_without"]
 
 #: Borders that run along each other within this distance [m] are meant to meet.
-MEET = 1e-3
+BORDERS_MEET = 1e-3
 
 #: Places in a border of a dart's left mouth, tip and right mouth, in counter-clockwise order.
 DartPlaces = tuple[int, int, int]
@@ -164,7 +164,7 @@ def _find_darts(
     corners = find_corners(flat[outer]) | {place for places in darts.values() for place in places}
     found = find_cracks(flat[outer], corners, {tip for _, tip, _ in darts.values()})
     if (worn := features.worn) is not None:
-        found = [each for each in found if np.linalg.norm(worn[outer[each[2]]] - worn[outer[each[0]]]) <= MEET]
+        found = [each for each in found if np.linalg.norm(worn[outer[each[2]]] - worn[outer[each[0]]]) <= BORDERS_MEET]
     return corners, darts | {(f"dart_{i + 1}" if len(found) > 1 else "dart"): each for i, each in enumerate(found)}
 
 

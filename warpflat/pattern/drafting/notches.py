@@ -40,8 +40,6 @@ SHORTEST, SPACING = 0.080, 0.200
 DOUBLE_SPACING = 0.008
 #: Least distance [m] of a notch from a joint of edges, in which it would be lost.
 CLEAR = 0.012
-#: Notches meet that are no farther apart than the sides of their seam may be [m].
-MEET = LOCAL_TOLERANCE
 #: Where a side cannot be notched, the notch is tried at these shares of its distance from the seam's start.
 SHARES_FROM_START = (1.0, 0.5, 0.25)
 
@@ -118,7 +116,9 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
             number, side, length = waiting.pop()
             seam, line = seams[number], lines[number][side]
             apart = float(np.abs(line.joints - length).min())
-            if apart <= MEET or any((n, k) == (number, side) and abs(x - length) <= MEET for n, k, x in seen):
+            if apart <= LOCAL_TOLERANCE or any(
+                (n, k) == (number, side) and abs(x - length) <= LOCAL_TOLERANCE for n, k, x in seen
+            ):
                 continue
             seen.append((number, side, length))
             part = line.index(length)
@@ -131,7 +131,7 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
                 local = beside.edges[place].length - along if copy.reversed else along
                 if groups[seams[other].name] == key[0]:
                     copies.append((other, at, float(beside.joints[place]) + local, copy))
-            if not any(abs(known - along) <= MEET for known in (*placed.get(key, ()), *found.get(key, ()))):
+            if not any(abs(known - along) <= LOCAL_TOLERANCE for known in (*placed.get(key, ()), *found.get(key, ()))):
                 # It is called by the seam of the edge that is drawn.
                 other, at, there, _ = next((copy for copy in copies if copy[3].is_drawn), copies[0])
                 notch = lines[other][at].notch(seams[other].name, there, double)
@@ -294,7 +294,7 @@ class SeamLine:
         count = self.pieces[part].piece.pleats
         stretch = self.edges[part].length / max(count, 1)
         local = length - float(self.joints[part])
-        return count == 0 or abs(local - stretch * round(local / stretch)) <= MEET
+        return count == 0 or abs(local - stretch * round(local / stretch)) <= LOCAL_TOLERANCE
 
     def marked(self, seams: Collection[str]) -> FloatArray:
         """Return the lengths [m] along the side at which its edges have notches of some seams, those of turned copies included."""

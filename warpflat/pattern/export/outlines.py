@@ -18,7 +18,7 @@ from warpflat.pattern.drafting.piece_parts import FOLD_STRAIGHT
 from warpflat.pattern.drafting.pieces import Piece
 
 __all__ = [
-    "MEET",
+    "ENDS_MEET",
     "MOST_POINTS",
     "TOO_MANY",
     "DrawnLine",
@@ -36,7 +36,7 @@ __all__ = [
 ]
 
 #: Ends of lines that are nearer to each other than this [m] meet.
-MEET = 5e-5
+ENDS_MEET = 5e-5
 #: Points of a drawing, at most: a pattern of several sizes has some ten thousand; and what is said of more.
 MOST_POINTS = 1_000_000
 TOO_MANY = f"the drawing has more than {MOST_POINTS:,} points; leave out all but the pattern"
@@ -93,7 +93,7 @@ class Outlines:
 
 
 def close_lines(lines: Sequence[DrawnLine], fold: FloatArray | None = None) -> Outlines:
-    """Return the closed lines, and those that open lines form whose ends meet within `MEET`, or lie on a fold (2 by 2 [m])."""
+    """Return the closed lines, and those that open lines form whose ends meet within `ENDS_MEET`, or lie on a fold (2 by 2 [m])."""
     import shapely
 
     rings = [line for line in lines if line.closed and len(line.points) > 2]
@@ -102,8 +102,8 @@ def close_lines(lines: Sequence[DrawnLine], fold: FloatArray | None = None) -> O
         return Outlines(rings=_largest_first(rings), chains=[])
     ends = np.concatenate([line.points[[0, -1]] for line in open_lines])
     # Those in one cell of a fine grid are as one, as in the middle of a star; the first of all that meet gives their place.
-    _, sample, cell = np.unique(np.floor(ends / (0.25 * MEET)), axis=0, return_index=True, return_inverse=True)
-    pairs = cKDTree(ends[sample]).query_pairs(MEET, output_type="ndarray")
+    _, sample, cell = np.unique(np.floor(ends / (0.25 * ENDS_MEET)), axis=0, return_index=True, return_inverse=True)
+    pairs = cKDTree(ends[sample]).query_pairs(ENDS_MEET, output_type="ndarray")
     node = join_labels(len(sample), *pairs.T)[cell.ravel()]
     place = ends[np.unique(node, return_index=True)[1]][node].reshape(-1, 2, 2)
     strings: Any = [

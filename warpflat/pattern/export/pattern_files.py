@@ -265,7 +265,7 @@ def write_pattern(
     from warpflat.pattern.drafting.curves import TOLERANCE
     from warpflat.pattern.drafting.cut_list import cut_list
     from warpflat.pattern.drafting.draft import draft_garment
-    from warpflat.pattern.drafting.notches import MEET
+    from warpflat.pattern.drafting.seam_difference import LOCAL_TOLERANCE
     from warpflat.pattern.drafting.walked import walk_seams
     from warpflat.pattern.export.pdf import too_many_sheets
 
@@ -304,7 +304,9 @@ def write_pattern(
                 *notes, f"the border is ragged at {', '.join(ragged)}: the curves keep within {within:.1f} mm of it",
             )  # fmt: skip
         notes = (*notes, *(f"{piece.name}: {note}" for piece in pieces for note in piece.notes))
-        missed = [seam for seam in drafted.seams if seam.notches_mm is not None and seam.notches_mm > 1000 * MEET]
+        missed = [
+            seam for seam in drafted.seams if seam.notches_mm is not None and seam.notches_mm > 1000 * LOCAL_TOLERANCE
+        ]
         notes = (*notes, *(f"{seam.name}: its notches miss each other by {seam.notches_mm:.1f} mm" for seam in missed))
         walked = walk_seams(drafted)
         drafted = enlarged(drafted, options.shrinkage, next(iter(pattern)).fabric)

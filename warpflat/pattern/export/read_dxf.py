@@ -26,7 +26,7 @@ from warpflat.pattern.drafting.piece_parts import Dart, Edge, Hole
 from warpflat.pattern.drafting.pieces import Pattern, Piece
 from warpflat.pattern.drafting.seam_words import seams_of_words
 from warpflat.pattern.export.outlines import (
-    MEET,
+    ENDS_MEET,
     MOST_POINTS,
     TOO_MANY,
     DrawnLine,
@@ -238,7 +238,7 @@ def _line(entity: Any, turn: FloatArray, metres: float, most: int) -> DrawnLine 
     if len(points) > most:
         raise InputError(TOO_MANY)
     points = points[np.linalg.norm(np.diff(points, axis=0, prepend=np.inf), axis=1) > 1e-9]
-    closed = len(points) > 2 and bool(np.linalg.norm(points[0] - points[-1]) < MEET)
+    closed = len(points) > 2 and bool(np.linalg.norm(points[0] - points[-1]) < ENDS_MEET)
     points = points[:-1] if closed else points
     return DrawnLine(points=points, closed=closed) if len(points) > 1 else None
 
@@ -299,7 +299,7 @@ def _pieces(
     if parts:
         # The name of a fish-eye dart stands in the middle of its points.
         for line in (line for line in inner if line.closed):
-            names = [name for name, tip in tips.items() if np.linalg.norm(line.points.mean(axis=0) - tip) < MEET]
+            names = [name for name, tip in tips.items() if np.linalg.norm(line.points.mean(axis=0) - tip) < ENDS_MEET]
             eyes += [Hole(name=name, points=line.points, kind="dart") for name in names]
         legs = [line.points for line in inner if not line.closed]
         cutting = [line.path for line in block.lines.get(_BOUNDARY, [])]
@@ -388,7 +388,7 @@ def _edges_without_names(
     """
     import shapely
 
-    fold, outer = _fold(block), shapely.Polygon(ring).buffer(MEET)
+    fold, outer = _fold(block), shapely.Polygon(ring).buffer(ENDS_MEET)
     sewing = block.lines.get(_SEWING, []) if block.lines.get(_BOUNDARY) else []
     joined = close_lines(sewing, fold)
     inner = [line.points for line in joined.rings]
@@ -408,5 +408,5 @@ def _edges_without_names(
     if not block.lines.get(_BOUNDARY):
         return split_outline(ring, None, fold)
     corners = np.array(block.points.get("2", [])).reshape(-1, 2)
-    corners = corners[shapely.distance(shapely.LinearRing(ring), shapely.points(corners)) < MEET]
+    corners = corners[shapely.distance(shapely.LinearRing(ring), shapely.points(corners)) < ENDS_MEET]
     return boundary_edges(ring, allowance, where, fold=fold, corners=corners if len(corners) > 1 else None)

@@ -27,7 +27,7 @@ from warpflat.pattern.drafting.pieces import Pattern, Piece
 from warpflat.pattern.drafting.polygons import mapped, signed_area
 from warpflat.pattern.drafting.seam_words import seams_of_words
 from warpflat.pattern.export.outlines import (
-    MEET,
+    ENDS_MEET,
     MOST_POINTS,
     TOO_MANY,
     DrawnLine,
@@ -402,7 +402,7 @@ class _Drawing:
                 raise InputError(
                     f"{_tag(element)} reaches farther than {FARTHEST:g} m, or has a coordinate that is no number"
                 )
-            if len(points) > 2 and np.linalg.norm(points[0] - points[-1]) < (1e-9 if closed else MEET):
+            if len(points) > 2 and np.linalg.norm(points[0] - points[-1]) < (1e-9 if closed else ENDS_MEET):
                 points, closed = points[:-1], True
             self._points += len(points)
             if self._points > MOST_POINTS:
