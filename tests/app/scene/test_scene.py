@@ -346,7 +346,7 @@ def test_film_pictures_and_paper_show_one_drawing(tmp_path: Path, monkeypatch: p
     drawn = list[str]()
     monkeypatch.setattr(Beside, "__enter__", lambda beside: beside)  # all in this process, where it is counted
     describe = to_pattern.describe_worn
-    monkeypatch.setattr(to_pattern, "describe_worn", lambda *given: (drawn.append(given[-1].name), describe(*given))[1])
+    monkeypatch.setattr(to_pattern, "describe_worn", lambda *given: (drawn.append(given[1].name), describe(*given))[1])
     skirt = (SCENES / "circle_skirt.toml").read_text().replace("[mannequin]\n", "[mannequin]\nresolution_mm = 25\n")
     result = run_scene(load_scene(write_scene(tmp_path, skirt, "skirt.toml")), tmp_path / "out")
     assert {"frames.usdc", "picture.png", "pattern.pdf"} < {*result.files}

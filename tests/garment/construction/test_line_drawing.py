@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.line_drawing import describe_worn
 from warpflat.pattern.drafting.piece_parts import Edge
 from warpflat.pattern.drafting.pieces import Pattern, Piece
+from warpflat.pattern.drafting.worn import ViewedPiece
 
 
 def skirt(opening: OpeningTable, *, half: bool) -> Garment:
@@ -20,9 +23,19 @@ def skirt(opening: OpeningTable, *, half: bool) -> Garment:
     return replace(garment, finishing=(FinishingTable(kind="waistband", edge="waist", width_mm=30),))
 
 
+def triangle(name: str, **other: Any) -> Piece:
+    outline = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    return Piece(name=name, edges=[Edge(name=str(k), points=outline[[k, (k + 1) % 3]]) for k in range(3)], **other)
+
+
+def views_of(garment: Garment, piece: Piece | None = None) -> Mapping[str, Sequence[ViewedPiece]]:
+    """How a garment is seen, of whose pattern one piece counts."""
+    return describe_worn({"": garment}, Pattern(name="p", pieces={"": [piece or triangle("other")]}), {}).views
+
+
 def test_waistband_lies_above_the_waist_and_a_zip_in_the_side_is_seen_on_that_side():
     garment = skirt(OpeningTable(kind="zip", seam="side left", length_mm=200), half=True)
-    views = describe_worn({"": garment}, "").views
+    views = views_of(garment)
     for name, sign in (("front", 1.0), ("back", -1.0)):
         # What of the band is on the far side lies behind all pieces.
         _, *pieces, band, zipped = views[name]
@@ -40,7 +53,7 @@ def test_waistband_lies_above_the_waist_and_a_zip_in_the_side_is_seen_on_that_si
 
 def test_every_button_is_drawn_in_front():
     opening = OpeningTable(kind="buttons", seam="centre front", length_mm=400, count=5)
-    views = describe_worn({"": skirt(opening, half=False)}, "").views
+    views = views_of(skirt(opening, half=False))
     (buttons,) = [piece for piece in views["front"] if not piece.outlines]
     heights = [float(circle[:, 1].mean()) for circle in buttons.lines]
     assert len(heights) == 5
@@ -50,9 +63,7 @@ def test_every_button_is_drawn_in_front():
 
 
 def test_a_zip_at_the_centre_back_is_not_seen_from_the_front():
-    views = describe_worn(
-        {"": skirt(OpeningTable(kind="zip", seam="centre back", length_mm=200), half=False)}, ""
-    ).views
+    views = views_of(skirt(OpeningTable(kind="zip", seam="centre back", length_mm=200), half=False))
     drawn = {name: [piece for piece in row if not piece.outlines] for name, row in views.items()}
     assert drawn["front"] == []
     (zipped,) = drawn["back"]
@@ -69,7 +80,7 @@ def test_a_zip_at_the_centre_back_is_not_seen_from_the_front():
 )
 def test_ruffle_hangs_below_its_edge_with_its_folds(wish: FinishingTable, wider: float, lines: int):
     garment = skirt(OpeningTable(kind="zip", seam="side left", length_mm=200), half=True)
-    plain, drawn = (describe_worn({"": replace(garment, finishing=row)}, "").views for row in ((), (wish,)))
+    plain, drawn = (views_of(replace(garment, finishing=row)) for row in ((), (wish,)))
     for name in ("front", "back"):
         before, after = (
             np.concatenate([ring for piece in row[name] for ring in piece.outlines]) for row in (plain, drawn)
@@ -121,7 +132,7 @@ def test_nothing_is_drawn_below_what_is_sewn_on_much_higher(kind: str):
 
 def test_right_half_of_a_wrap_covers_the_left_one():
     garment = skirt(OpeningTable(kind="wrap", seam="centre front", width_mm=120), half=False)
-    views = describe_worn({"": garment}, "").views
+    views = views_of(garment)
     shell = [piece for piece in views["front"] if piece.outlines][1:-1]
     # To the viewer's right of the centre by its width; nothing of the centre line is seen on it.
     upper = shell[-1]
@@ -140,11 +151,8 @@ def test_patches_are_drawn_on_their_side_of_the_body():
     flat = next(piece for name, piece in garment.pieces.items() if "front" in name)
     middle = flat.positions.mean(axis=0)
     lines = {name: np.array(line) - [0.1, 0.35] + middle for name, line in sides.items()}
-    outline = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    edges = [Edge(name=str(k), points=outline[[k, (k + 1) % 3]]) for k in range(3)]
-    marked = Piece(name=flat.surface.name, edges=edges, internal_lines=lines)
-    pattern = Pattern(name="p", pieces={"": [marked]})
-    plain, drawn = (describe_worn({"": garment}, "", pattern=each).views for each in (None, pattern))
+    marked = triangle(flat.surface.name, internal_lines=lines)
+    plain, drawn = views_of(garment), views_of(garment, marked)
     assert len(drawn["back"]) == len(plain["back"])
     (patch,) = drawn["front"][-1].lines
     # Closed where it is left open on the piece, and as large as that.
@@ -169,3 +177,20 @@ def test_a_band_that_draws_the_garment_in_is_its_finished_measure():
     assert {name: length for name, length in drawn.items() if name != "waist"} == {
         name: length for name, length in plain.items() if name != "waist"
     }
+
+
+def test_a_band_that_draws_the_garment_in_is_not_too_large():
+    """Of a waist that is a fifth too large the pattern says what the run does, which looks at the band."""
+    garment = replace(
+        flat_form("skirt", OpeningTable(kind="zip", seam="side left", length_mm=200), half=False), openings=()
+    )
+    waist = garment.girths["waist"]
+    large = 1.2 * waist["form_m"]
+    girths = {"waist": {**waist, "pattern_m": large, "ease_m": large - waist["body_m"]}}
+    failing = []
+    for finishing in ((), (FinishingTable(kind="band", edge="waist", width_mm=40, share=0.9),)):
+        made = replace(garment, finishing=finishing)
+        pattern = pattern_of(made)
+        made.__dict__["girths"] = girths
+        failing.append("too large" in describe_worn({"": made}, pattern, {}).failing)
+    assert failing == [True, False]

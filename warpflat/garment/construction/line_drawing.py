@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import groupby
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,18 +47,15 @@ _TIE_HANGS, _TIES = 0.22, (-0.25, 0.2)
 _CIRCLE = np.column_stack([f(np.linspace(0.0, 2.0 * np.pi, 17)) for f in (np.cos, np.sin)])
 
 
-def describe_worn(
-    garments: Mapping[str, Garment], sample: str, rises: Rises = MappingProxyType({}), pattern: Pattern | None = None
-) -> Worn:
+def describe_worn(garments: Mapping[str, Garment], pattern: Pattern, rises: Rises) -> Worn:
     """Return the line drawing of a garment in its sample size, the measures of all sizes, and the openings that it needs.
 
     Args:
         garments: flattened, by size, on their bodies.
-        sample: the size that is drawn.
-        rises: of its slanted hems.
         pattern: of the garment, on which places of pockets are marked, and whose cuffs and bands draw it in.
+        rises: of its slanted hems.
     """
-    garment = garments[sample]
+    garment = garments[pattern.sample]
     cloth, on_form = list(garment.pieces.values()), garment if isinstance(garment, FormGarment) else None
     # What hangs nearer to the viewer hides what lies behind it: the inside of a back shows above the neck of a front.
     depth = np.array([flat.surface.vertices[:, 2].mean() for flat in cloth])
@@ -73,14 +69,16 @@ def describe_worn(
             seen = [_without_lost_strips(on_form, *each, sign, rises) for each in zip(names, seen, strict=True)]
             behind, before = finishing_views(on_form, sign, rises)
             seen = [*behind, *_wrapped(on_form, seen, names, sign), *before, *_openings(on_form, sign)]
-            seen += _pockets(on_form, () if pattern is None else pattern.pieces[sample], sign)
+            seen += _pockets(on_form, pattern.pieces[pattern.sample], sign)
         views[name] = tuple(piece for piece in seen if piece.outlines or piece.lines)
+    bands = {size: bands_of(pattern, size) for size in garments}
+    girths = {size: drawn_in(each.girths, bands[size]) for size, each in garments.items()}
     measures = {}
-    for size, each in garments.items():
+    for size, own in girths.items():
         found = list[Measure]()
-        for level, girth in drawn_in(each.girths, {} if pattern is None else bands_of(pattern, size)).items():
+        for level, girth in own.items():
             # Arms and legs are told once.
-            if level.endswith(" right") and other_side(level) in each.girths:
+            if level.endswith(" right") and other_side(level) in own:
                 continue
             name, asked = without_side(level), girth.get("ease_wanted_m")
             found.append(Measure(name=name, body=girth["body_m"], finished=girth["pattern_m"], asked=asked))
@@ -90,11 +88,11 @@ def describe_worn(
         NeededOpening(
             ring=ring.name, length=ring.length, over=ring.over, girth=ring.girth, depth=ring.opening_needed_mm / 1000
         )
-        for ring in (ring.drawn_in({} if pattern is None else bands_of(pattern, sample)) for ring in garment.rings)
+        for ring in (ring.drawn_in(bands[pattern.sample]) for ring in garment.rings)
         if ring.passes is False and ring.girth is not None
     )  # fmt: skip
     knits = dict.fromkeys(flat.fabric.name for flat in cloth if flat.fabric.is_knit)
-    verdict = judge(garment.metrics())
+    verdict = judge({**garment.metrics(), "girths": girths[pattern.sample]})
     failing = dict.fromkeys(finding.kind for finding in verdict.findings if finding.fails) if verdict else {}
     mens = on_form is not None and re.search(r"\bmen\b", on_form.mannequin.source) is not None
     fabrics = {flat.fabric.name: flat.fabric for flat in cloth}

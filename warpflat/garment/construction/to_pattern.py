@@ -111,7 +111,7 @@ class _Drawn:
     Attributes:
         pattern: pieces and seams.
         notes: what was chosen on the way, one sentence each.
-        laid: by size, the garment as its pieces were drawn; empty where every piece is cut as it is.
+        is_whole: whether these are all pieces of a garment, so that one is drawn of those that are alike, and how it is worn.
         unlike: pieces that are going to be cut unlike their mirror images.
         placed: by size and opening, the seams that it runs along.
         alike: how the names of pieces begin that may be drawn once where they are equal.
@@ -119,7 +119,7 @@ class _Drawn:
 
     pattern: Pattern
     notes: tuple[str, ...]
-    laid: Mapping[str, Garment]
+    is_whole: bool = True
     unlike: Collection[str] = ()
     placed: Mapping[str, Sequence[Sequence[OpeningPart]]] = field(default_factory=dict)
     alike: str = ""
@@ -161,9 +161,9 @@ def pattern_of_garment(
         drawn = _drawn_on_forms(forms, name, rules, sample_size)
     else:
         drawn = _drawn_of_meshes(sample, name, rules, twice=twice)
-    pattern, notes, laid = drawn.pattern, drawn.notes, drawn.laid
-    if laid:
-        pattern, pairs = draw_pairs_once(pattern, laid, drawn.unlike)
+    pattern, notes, garments = drawn.pattern, drawn.notes, forms or {"": sample}
+    if drawn.is_whole:
+        pattern, pairs = draw_pairs_once(pattern, garments, drawn.unlike)
         notes += pairs
     pattern = mark_openings(pattern, sample.openings, drawn.placed)
     gaps = [
@@ -182,13 +182,13 @@ def pattern_of_garment(
     rises: Mapping[tuple[str, str], Any] = {}
     with optional_step("the pattern has no finishing"):
         rises = hem_rises(pattern, sample.finishing)
-        girths = {size: garment.body_girths for size, garment in laid.items()}
+        girths = {size: garment.body_girths for size, garment in garments.items()}
         pattern = finish_edges(
             pattern, sample.finishing, gaps=gaps, stands=stands, girths=girths, cloth_width=cloth_width
         )
     with optional_step("the pattern has no pockets"):
         pattern = with_flies(add_pockets(pattern, sample.pockets))
-    if laid and not rises:
+    if drawn.is_whole and not rises:
         # Equal pieces stay equal, unless a slanted hem cuts them.
         pattern, equal = draw_equal_pieces_once(pattern, called=drawn.alike)
         notes += equal
@@ -211,10 +211,9 @@ def pattern_of_garment(
             ]
             curved.append(replace(piece, edges=edges))
         pattern = with_pieces(pattern, curved)
-    if laid:
+    if drawn.is_whole:
         with optional_step(_NO_DRAWING, is_needed=False):
-            worn = describe_worn(laid, pattern.sample, rises, pattern)
-            pattern = replace(pattern, worn=worn)
+            pattern = replace(pattern, worn=describe_worn(garments, pattern, rises))
     return pattern, notes
 
 
@@ -253,11 +252,8 @@ def _drawn_of_meshes(sample: Garment, name: str, rules: EdgeRules, *, twice: boo
             if other - one > SEAM_TOLERANCE:
                 seam = replace(seam, sides=(first, second), ease=other / one - 1.0)
         seams.append(replace(seam, as_laid=joined in as_laid))
-    drawn_for_others = twice and len(sample.pieces) > 1 and sample.parts.keys() == sample.pieces.keys()
-    return _Drawn(
-        pattern=replace(pattern, seams=seams), notes=notes,
-        laid=dict.fromkeys(pattern.pieces, sample) if drawn_for_others else {},
-    )  # fmt: skip
+    is_whole = twice and len(sample.pieces) > 1 and sample.parts.keys() == sample.pieces.keys()
+    return _Drawn(pattern=replace(pattern, seams=seams), notes=notes, is_whole=is_whole)
 
 
 def _drawn_on_forms(
@@ -335,7 +331,7 @@ def _drawn_on_forms(
     )
     pattern = Pattern(name=name, pieces=pieces, seams=seams, sample_size=sample_size)
     # Of the pieces of a form no others are equal: godets are.
-    return _Drawn(pattern=pattern, notes=notes, laid=laid, unlike=unlike, placed=placed, alike="godet")
+    return _Drawn(pattern=pattern, notes=notes, unlike=unlike, placed=placed, alike="godet")
 
 
 def _form_piece(
