@@ -34,7 +34,7 @@ def rings_on_form(scene: Scene) -> tuple[dict[str, GarmentRing], tuple[str, ...]
     on_form = {name: piece.surface.vertices for name, piece in form.pieces.items()}
     rings = measure_rings(
         mannequin, form, on_form, strain_limit=scene_fabric(scene).strain_limit,
-        girths=pattern_girths(mannequin, form, on_form), opened=opened_rings(mannequin, form, on_form, plan.openings),
+        girths=pattern_girths(mannequin, form, on_form), opened=opened_rings(mannequin, form, on_form, plan.openings, []),
     )  # fmt: skip
     return {ring.name: ring for ring in rings}, form.notes
 

@@ -208,6 +208,6 @@ def test_two_rings_at_one_line_are_opened_each_by_its_own(mannequin: Mannequin, 
     waist, length = found["waist"]
     shorter = waist[:0], 0.5 * length
     monkeypatch.setattr(openings, "find_rings", lambda *_: {"waist": (waist, length), "waist 2": shorter})
-    more = openings.opened_rings(mannequin, skirt.form, skirt.positions, [ZIP])
+    more = openings.opened_rings(mannequin, skirt.form, skirt.positions, [ZIP], [])
     assert more["waist"] == pytest.approx(0.4)
     assert more.get("waist 2", 0.0) == 0.0

@@ -144,13 +144,10 @@ def cap_wishes(form: FormResult, fabric: Fabric, wishes: Sequence[SeamTable] = (
     Raises:
         InputError: as :func:`seam_ratios`, to which `wishes` must be right.
     """
-    seam_ratios(form, wishes)
+    asked = seam_ratios(form, wishes).ease
     if fabric.is_knit:
         return []
-    plan = plan_form(form)
-    also = {seam.name: plan.of_form[i][0].name for i, seam in enumerate(form.seams)}
-    asked = {also.get(wish.name, wish.name) for wish in wishes}
-    caps = [seam.name for seam in plan.seams if _is_cap(form, seam) and seam.name not in asked]
+    caps = [seam.name for seam in plan_form(form).seams if _is_cap(form, seam) and seam.name not in asked]
     return [SeamTable(name=name, fullness=_WOVEN_CAP) for name in caps]
 
 

@@ -45,7 +45,7 @@ from warpflat.garment.construction.shaped_band import shortened, slant_rises, wi
 from warpflat.garment.construction.strips import NARROW, Strip, panel_count
 from warpflat.pattern import CLOTH_WIDTH, Edge, Elastic, Pattern, Piece, SeamSide, line_name
 
-__all__ = ["finish_edges", "hem_rises", "with_plackets"]
+__all__ = ["finish_edges", "hem_rises"]
 
 #: Strips by kind: whether they are folded, the direction of their grain, their role.
 _STRIPS = {
@@ -155,15 +155,6 @@ def hem_rises(pattern: Pattern, finishing: Sequence[FinishingTable]) -> dict[Pla
             with _said_of(number):
                 places = _opened_up(pattern, wish.edge, sewn_there=False)[1]
                 found |= slant_rises(pattern, places, wish.shorten, pattern.sample)
-    return found
-
-
-def with_plackets(opened: Mapping[str, float], finishing: Sequence[FinishingTable]) -> dict[str, float]:
-    """Return what openings add to rings [m], with both edges of the plackets below collars."""
-    found = dict(opened)
-    for wish in finishing:
-        if wish.kind == "collar" and wish.placket:
-            found[wish.edge] = found.get(wish.edge, 0.0) + 2.0 * wish.placket
     return found
 
 

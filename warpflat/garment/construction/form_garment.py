@@ -24,7 +24,6 @@ from warpflat.garment.construction.darts import dart_constraints, dart_pairs, me
 from warpflat.garment.construction.details import SeamTable
 from warpflat.garment.construction.drawn_curves import CURVES_MM, Curves, measure_curves, plan_curves
 from warpflat.garment.construction.ease import SeamRatios, seam_ratios
-from warpflat.garment.construction.finishing import with_plackets
 from warpflat.garment.construction.fullness import give_fullness
 from warpflat.garment.construction.garment import Garment
 from warpflat.garment.construction.girths import girth_constraints, loose_armholes, pattern_girths
@@ -83,9 +82,7 @@ class FormGarment(Garment):
         return measure_rings(
             self.mannequin, self.form, positions, strain_limit=first.fabric.strain_limit,
             girths=self.girths,
-            opened=with_plackets(
-                opened_rings(self.mannequin, self.form, positions, self.openings), self.finishing
-            ),
+            opened=opened_rings(self.mannequin, self.form, positions, self.openings, self.finishing),
         )  # fmt: skip
 
     @cached_property

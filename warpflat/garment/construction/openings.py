@@ -18,7 +18,7 @@ from warpflat.core import (
     other_side,
     without_side,
 )
-from warpflat.garment.construction.details import OpeningTable
+from warpflat.garment.construction.details import FinishingTable, OpeningTable
 from warpflat.garment.construction.rings import find_rings
 from warpflat.garment.mannequin.bricks import select_bricks
 from warpflat.garment.mannequin.forms import Form, PieceRecipe
@@ -164,9 +164,13 @@ def one_sided(openings: Sequence[OpeningTable]) -> list[OpeningTable]:
 
 
 def opened_rings(
-    mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray], openings: Sequence[OpeningTable]
+    mannequin: Mannequin,
+    form: FormResult,
+    positions: Mapping[str, FloatArray],
+    openings: Sequence[OpeningTable],
+    finishing: Sequence[FinishingTable],
 ) -> dict[str, float]:
-    """Return by ring how much longer openings make it [m].
+    """Return by ring how much longer openings, and plackets below collars, make it [m].
 
     The way around goes along an opening to its end and back: twice the distance to the nearer end that is closed.
     """
@@ -193,4 +197,7 @@ def opened_rings(
                     passed[name] = max(passed.get(name, 0.0), 2.0 * depth)
         for name, more in passed.items():
             found[name] = found.get(name, 0.0) + more
+    for wish in finishing:
+        if wish.kind == "collar" and wish.placket:
+            found[wish.edge] = found.get(wish.edge, 0.0) + 2.0 * wish.placket
     return found

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 from warpflat.core import InputError, without_side
 from warpflat.garment.construction.details import FinishingTable, OpeningTable
-from warpflat.garment.construction.finishing import with_plackets
 from warpflat.garment.construction.openings import opened_rings, sized_opening
 from warpflat.garment.construction.rings import measure_rings
 from warpflat.garment.mannequin.forms import FormResult
@@ -53,7 +52,7 @@ def wide_enough(
         short = dict[str, float]()
         for ring in measure_rings(
             mannequin, form, on_form, strain_limit=strain_limit, girths=pattern_girths(mannequin, form, on_form),
-            opened=with_plackets(opened_rings(mannequin, form, on_form, sized), finishing),
+            opened=opened_rings(mannequin, form, on_form, sized, finishing),
         ):  # fmt: skip
             if ring.girth is None:
                 continue
