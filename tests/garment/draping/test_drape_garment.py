@@ -33,6 +33,7 @@ from warpflat.flat.surface.connectivity import border_loops
 from warpflat.flat.surface.paths.lines import with_lines
 from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.garment.construction.details import SeamTable
+from warpflat.garment.draping import drape_garment
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.drape_energy import DrapeEnergy
 from warpflat.garment.draping.drape_garment import thread_elastics
@@ -92,6 +93,24 @@ def test_a_garment_of_meshes_keeps_its_seams():
 
 def no_strains(faces: np.ndarray) -> dict[str, np.ndarray]:
     return {name: np.zeros(len(faces)) for name in ("warp", "weft", "shear")}
+
+
+def test_what_has_sunk_to_the_legs_of_the_body_that_wears_it_has_fallen_off(monkeypatch: pytest.MonkeyPatch):
+    """Whether the garment was made on a body, as a form is, or on none, as a piece of a mesh."""
+    legs = list[float]()
+
+    def relax(*_: object, **given: Any) -> None:
+        legs.append(given["legs"])
+        raise InterruptedError
+
+    monkeypatch.setattr(drape_garment, "relax_drape", relax)
+    own, other = body_of_size(30.0), body_of_size(30.0, "EU 46")
+    piece = warpflat.flatten(make_surface(*grid(9, 5, cylinder), name="tube"), fabric="woven")
+    form = warpflat.flatten_form(own, own.form("skirt"), fabric="woven", sewn=False)
+    for garment, body in ((piece, None), (piece, other), (form, None), (form, other)):
+        with pytest.raises(InterruptedError):
+            warpflat.drape(garment, body)
+    assert legs == [-np.inf, *(each.line("thigh")[:, 1].mean() for each in (other, own, other))]
 
 
 def test_cloth_gapes_at_its_edges_and_stands_off_inside(worn: warpflat.Drape):

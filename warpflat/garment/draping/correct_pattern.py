@@ -29,7 +29,6 @@ from warpflat.core import (
     short_repr,
     turned_left,
     unit,
-    weighted_percentiles,
 )
 from warpflat.flat import Fabric, Flattening, border_edges, corner_triangles
 from warpflat.garment.construction.garment import Garment
@@ -45,7 +44,7 @@ from warpflat.garment.draping.moved_pattern import (
     with_pattern,
 )
 from warpflat.garment.draping.relax_drape import relax_drape
-from warpflat.garment.draping.result import Drape
+from warpflat.garment.draping.result import Drape, spread
 from warpflat.garment.draping.sewn_cloth import SewnCloth, pieces_of
 from warpflat.pattern import Pattern
 
@@ -245,11 +244,8 @@ def _check_rest(drape: Drape) -> None:
 
 def _round(drape: Drape, share: float, bridging: bool) -> Round:
     strained = float(drape.face_areas[drape.demand.held].sum() / drape.face_areas.sum())
-    off = drape.misfit if bridging else drape.distance
-    mean = float((off * drape.areas).sum() / drape.areas.sum())
-    return Round(
-        misfit=mean, misfit_p95=weighted_percentiles(off, drape.areas, [0.95])[0], strained=strained, share=share
-    )
+    off = spread(drape.misfit if bridging else drape.distance, drape.areas)
+    return Round(misfit=off["mean"], misfit_p95=off["p95"], strained=strained, share=share)
 
 
 def relieve_pattern(drape: Drape, *, hold: Sequence[str] = (), rounds: int = 6) -> Correction:

@@ -21,7 +21,7 @@ from warpflat.garment.draping.sewn_cloth import SewnCloth, pieces_of, sew_cloth
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.pattern import MIRRORED, unnumbered
 
-__all__ = ["come_to_rest", "drape", "held_vertices", "hip_level", "thread_elastics"]
+__all__ = ["come_to_rest", "drape", "held_vertices", "line_height", "thread_elastics"]
 
 # So often is what an elastic draws in moved towards the body, level.
 _LEVELLED = 20
@@ -71,7 +71,8 @@ def drape(
         cloth, gripped = thread_elastics(cloth, elastics, solid)
         designed = Body(cloth.designed, cloth.faces, device=where)
     options = options or DrapeOptions()
-    worn, frames = come_to_rest(cloth, solid, [*hold, *gripped], options, callback, legs=leg_level(mannequin))
+    wearer = body if isinstance(body, Mannequin) else mannequin
+    worn, frames = come_to_rest(cloth, solid, [*hold, *gripped], options, callback, wearer)
     sources = tuple(source for piece in pieces.values() for source in piece.surface.sources)
     # A cut that `warpflat.advise` has found on one side stands for that on the other side of the body, too.
     cuts = {}
@@ -80,7 +81,7 @@ def drape(
         cuts[name] = [(words, np.concatenate([path, path * [-1.0, 1.0, 1.0]])) for words, path in paths]
     return Drape(
         cloth=cloth, worn=worn, body=solid, designed=designed, options=options, sources=sources, frames=frames,
-        hangs_below=hip_level(mannequin), cuts=cuts, threaded=gripped,
+        hangs_below=line_height(mannequin, "hip"), cuts=cuts, threaded=gripped,
     )  # fmt: skip
 
 
@@ -90,22 +91,22 @@ def come_to_rest(
     hold: Sequence[str],
     options: DrapeOptions,
     callback: Callable[[int, float], None] | None,
-    *,
-    legs: float = -np.inf,
+    wearer: Mannequin | None,
 ) -> tuple[DrapedCloth, tuple[NDArray[np.float32], ...]]:
     """Relax sewn cloth on a body, held as in :func:`drape`; return it, and where it was on its way (#V by 3 each [m]).
 
     Args:
-        cloth, body, options, callback, legs: as of :func:`warpflat.garment.draping.relax_drape.relax_drape`.
+        cloth, body, options, callback: as of :func:`warpflat.garment.draping.relax_drape.relax_drape`.
         hold: lines that stay where they are.
+        wearer: whose thighs are where the body is two legs; None if it is no mannequin.
 
     Raises:
         InputError: an unknown line, or nothing holds the garment.
     """
     frames = list[NDArray[np.float32]]()
     worn = relax_drape(
-        cloth, body, options=options, held=held_vertices(cloth, hold), legs=legs, callback=callback,
-        observer=lambda places: frames.append(places.astype(np.float32)),
+        cloth, body, options=options, held=held_vertices(cloth, hold), legs=line_height(wearer, "thigh"),
+        callback=callback, observer=lambda places: frames.append(places.astype(np.float32)),
     )  # fmt: skip
     worn.check_held()
     return worn, tuple(frames)
@@ -147,11 +148,6 @@ def thread_elastics(cloth: SewnCloth, edges: Sequence[str], body: Body) -> tuple
     return replace(cloth, designed=drawn), gripped
 
 
-def leg_level(body: Mannequin | None) -> float:
-    """Return the height of a mannequin's thighs, where the body is two legs [m]; that of no body lies below everything."""
-    return -np.inf if body is None else float(body.line("thigh")[:, 1].mean())
-
-
-def hip_level(body: Mannequin | None) -> float:
-    """Return the height of a mannequin's hip, below which cloth hangs freely [m]; that of no body lies below everything."""
-    return -np.inf if body is None else float(body.line("hip")[:, 1].mean())
+def line_height(body: Mannequin | None, line: str) -> float:
+    """Return the mean height of a line of a mannequin [m]; that of no body lies below everything."""
+    return -np.inf if body is None else float(body.line(line)[:, 1].mean())

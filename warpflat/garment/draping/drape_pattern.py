@@ -27,7 +27,7 @@ from warpflat.garment.construction.mirror import mirror_plane
 from warpflat.garment.draping.body import Body
 from warpflat.garment.draping.check_sewn import check_sewn
 from warpflat.garment.draping.continue_pieces import continue_pieces, hang_from_edges, hood_beside_head
-from warpflat.garment.draping.drape_garment import come_to_rest, hip_level, leg_level, thread_elastics
+from warpflat.garment.draping.drape_garment import come_to_rest, line_height, thread_elastics
 from warpflat.garment.draping.lay_around import Laid, lay_around
 from warpflat.garment.draping.lift import Lift, surface_lift, whole_lifts
 from warpflat.garment.draping.limbs import armpit_heights, limb_lines, on_arm
@@ -145,8 +145,7 @@ def drape_pattern(
     start_warp()
     where = wp.get_device(device)
     lifts = whole_lifts(pattern.pieces[chosen], placement.lifts)
-    hood = {name for name, piece in pieces.items() if piece.role == "hood"}
-    solid = None if body is None else _worn_body(body, head=bool(hood), device=where)
+    solid = None if body is None else _worn_body(body, pieces, device=where)
     # On another body than that of its designed surface a garment starts as one that has none, if it can.
     placed = _where_designed(meshed, lifts)
     lifted = len(placed) == len(meshes) or bool(placed and body is not None)
@@ -174,7 +173,7 @@ def drape_pattern(
     cloth, gripped = thread_elastics(cloth, threaded, solid)
     if gripped:
         notes.append(f"held by an elastic: {', '.join(threaded)}")
-    worn, frames = come_to_rest(cloth, solid, [*placement.hold, *gripped], options, callback, legs=leg_level(body))
+    worn, frames = come_to_rest(cloth, solid, [*placement.hold, *gripped], options, callback, body)
     if not lifted:
         # What it should lie on is the body below it.
         cloth, designed = replace(cloth, designed=solid.nearest(worn.positions)[0]), solid
@@ -186,7 +185,7 @@ def drape_pattern(
         options=options,
         frames=frames,
         drafted=drafted,
-        hangs_below=hip_level(body),
+        hangs_below=line_height(body, "hip"),
         threaded=gripped,
     ), notes
 
@@ -233,8 +232,7 @@ def place_drafted(pattern: Pattern, garment: FormGarment) -> dict[str, list[Surf
     meshed = mesh_pieces(pieces, seams, _COARSE)
     meshes = meshed.meshes
     start_warp()
-    hooded = any(piece.role == "hood" for piece in pieces.values())
-    solid = _worn_body(body, head=hooded, device=wp.get_device("cpu"))
+    solid = _worn_body(body, pieces, device=wp.get_device("cpu"))
     placed = _where_designed(meshed, whole)
     falling = {name: _FLOUNCE_FLARES for name in drafted if is_flounce(pieces[name])}
     falling |= {
@@ -275,11 +273,14 @@ def _sewn_to(cloth: SewnCloth, stay: Collection[str], body: Body) -> SewnCloth:
     return replace(cloth, designed=sew_around(cloth, cloth.designed, body, fixed=stays))
 
 
-def _worn_body(body: Mannequin, *, head: bool, device: wp.Device) -> Body:
-    """Return the body that a pattern is worn on: its limbs run on beyond their ends, with a head if asked for and known."""
+def _worn_body(body: Mannequin, pieces: Mapping[str, Piece], *, hooded: bool = False, device: wp.Device) -> Body:
+    """Return the body that pieces are worn on: its limbs run on beyond their ends, below a hood with a head, if that is known.
+
+    What has the openings of a hood is one, too, whatever its pieces are called.
+    """
     surface = body.surface()
     vertices, faces = draw_out_limbs(surface.vertices, surface.faces)
-    above = head_of(body) if head else None
+    above = head_of(body) if hooded or any(piece.role == "hood" for piece in pieces.values()) else None
     if above is not None:
         faces = np.concatenate([triangulate(faces)[0], above[1] + len(vertices)])
         vertices = np.concatenate([vertices, above[0]])
@@ -319,8 +320,7 @@ def _sew(
         # What is sewn wrong as it hangs from the shoulders may come right as it hangs from the collar: tops far too wide for a body do.
         laid = lay_pieces(cloth, meshed, openings, body, top=placement.top, on_shoulders=not refused)
         start, limbs = laid.positions, laid.limbs
-        is_hooded = laid.hooded or any(piece.role == "hood" for piece in pieces.values())
-        solid = _worn_body(body, head=is_hooded, device=device)
+        solid = _worn_body(body, pieces, hooded=laid.hooded, device=device)
         # What begins below the arms passes through.
         below = np.zeros(len(start), dtype=bool)
         for rows in cloth.piece_vertices.values():

@@ -20,7 +20,7 @@ from warpflat.garment.draping.places import Place, find_places
 from warpflat.garment.draping.relax_drape import DrapedCloth
 from warpflat.garment.draping.sewn_cloth import SewnCloth
 
-__all__ = ["HOLLOW_REACH", "Drape", "hollow_depths"]
+__all__ = ["HOLLOW_REACH", "Drape", "hollow_depths", "spread"]
 
 # Distances up to this are not looked into [m].
 _NEGLIGIBLE = 1e-3
@@ -156,8 +156,7 @@ class Drape:
         along = [np.linalg.norm(threads, axis=1) - 1.0 for threads in (warp, weft)]
         shear = shear_angles(np.column_stack([*along, (warp * weft).sum(axis=1)]))
         strains = {"warp": along[0], "weft": along[1], "shear": shear}
-        total = np.bincount(face, area)
-        return {name: np.bincount(face, area * values) / total for name, values in strains.items()}
+        return {name: np.bincount(face, area * values) / self.face_areas for name, values in strains.items()}
 
     @cached_property
     def demand(self) -> Demand:
@@ -232,9 +231,9 @@ class Drape:
             "friction": self.options.friction,
             "bending_n_m": fabric.bending,
             "compared_with": self.compared_with,
-            "distance_m": _spread(self.distance, areas),
-            "misfit_m": _spread(self.misfit, areas),
-            "bridged_m": _spread(self.bridged, areas),
+            "distance_m": spread(self.distance, areas),
+            "misfit_m": spread(self.misfit, areas),
+            "bridged_m": spread(self.bridged, areas),
             "deepest_m": max(0.0, -float(self.gap.min())),
             "gap_m": {line: float(self.gap[ids].max()) for line, ids in self.cloth.lines.items()},
             "strain_limit": fabric.strain_limit,
@@ -247,14 +246,14 @@ class Drape:
             found[key] = {"p5": low, "p95": high, "min": float(values.min()), "max": float(values.max())}
         touching = self.worn.pressing > 0.0
         pressure = (
-            _spread(self.pressure[touching], areas[touching]) if touching.any() else _spread(np.zeros(1), np.ones(1))
+            spread(self.pressure[touching], areas[touching]) if touching.any() else spread(np.zeros(1), np.ones(1))
         )
         found["pressure_pa"] = {**pressure, "touching": float(areas[touching].sum() / areas.sum())}
         found["places"] = [place.as_dict() for place in self.places]
         return found
 
 
-def _spread(values: FloatArray, weights: FloatArray) -> dict[str, float]:
+def spread(values: FloatArray, weights: FloatArray) -> dict[str, float]:
     """Return mean, 95th percentile by area and maximum."""
     mean = float((values * weights).sum() / weights.sum())
     return {"mean": mean, "p95": weighted_percentiles(values, weights, [0.95])[0], "max": float(values.max())}
