@@ -183,6 +183,18 @@ def test_without_its_body_one_is_fitted_inside(tmp_path: Path):
     assert np.ptp(carried.vertices[:, 1]) == pytest.approx(0.55, abs=0.1)
 
 
+@pytest.mark.parametrize(("ahead", "faces"), [(1.0, "+z"), (-1.0, "-z")])
+def test_a_body_inside_faces_as_its_garment_does(tmp_path: Path, ahead: float, faces: str):
+    rows, count = list[str](), 1
+    for name, piece in body_of_size(20.0, "EU 36").form("bodice").pieces.items():
+        rows.append(f"o {name}")
+        rows += [f"v {x} {y} {z}" for x, y, z in (piece.surface.vertices * [ahead, 1.0, ahead]).tolist()]
+        rows += ["f " + " ".join(str(k + count) for k in face if k >= 0) for face in piece.surface.faces.tolist()]
+        count += len(piece.surface.vertices)
+    (tmp_path / "bodice.obj").write_text("\n".join(rows))
+    assert f"which faces {faces};" in read_job(tmp_path / "bodice.obj", units="m").notes[0]
+
+
 @pytest.mark.parametrize(
     ("front", "faces"), [("+x", (1.0, 0.0, 0.0)), ("-x", (-1.0, 0.0, 0.0)), ("-z", (0.0, 0.0, -1.0))]
 )

@@ -101,7 +101,7 @@ def test_the_fit_follows_a_landmark_that_is_given() -> None:
         assert {name: _height(laid, name) for name in moved} == pytest.approx(wanted, abs=0.004)
         # The body slides within its skin.
         assert laid.unsure is None, moved
-        assert laid.far < free.far + 0.002, moved
+        assert laid.fit.far < free.fit.far + 0.002, moved
         # What lies far from it stays.
         assert _height(laid, "head") == pytest.approx(_height(free, "head"), abs=0.003), moved
     # What lies beside it goes along.

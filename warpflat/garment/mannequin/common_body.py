@@ -44,7 +44,7 @@ class CommonBody:
         vertices: #V by 3 [m], the finer model's, laid on the body.
         above: how far a level lies above the model's landmark of its name [m]; 0 of those left out.
         turn, shift: points of the body's file come here as points @ turn + shift.
-        far: mean distance of the fitted model from the body [m].
+        far: mean distance of the fitted model from the body; inside a garment that by which fits are compared [m].
     """
 
     name: str
@@ -78,7 +78,7 @@ class CommonBody:
             above={level: read.found[level].height - height_of(level, read.body.vertices) for level in TRUNK},
             turn=turn,
             shift=shift,
-            far=read.laid.far,
+            far=read.laid.fit.far,
         )
 
     @classmethod
@@ -126,15 +126,14 @@ class CommonBody:
                 follows[sign * vertices[:, 0] <= 0.0] = 0.0
                 moves += follows[:, None] * (at_low + np.clip(height, 0.0, 1.0)[:, None] * (at_top - at_low))
             vertices, _ = lay_on_scan(vertices + moves, mesh)
-        far = float(fit.distance[np.isfinite(fit.distance)].mean())
-        return cls(name=name, person=fit.person, vertices=vertices, far=far)
+        return cls(name=name, person=fit.person, vertices=vertices, far=fit.far)
 
     @classmethod
     def inside(cls, vertices: FloatArray, triangles: NDArray[np.int64], *, name: str) -> CommonBody:
         """Return the body that may wear a garment (#V by 3 [m], Y up, front +Z; #T by 3, outward)."""
         fit = fit_inside(vertices, triangles)
         model, finer = BodyModel.load(), finer_body()[0]
-        return cls(name=name, person=fit.person, vertices=finer @ model.vertices(fit.person))
+        return cls(name=name, person=fit.person, vertices=finer @ model.vertices(fit.person), far=fit.cost)
 
     @staticmethod
     @lru_cache(maxsize=1)

@@ -62,6 +62,11 @@ class FittedBody:
     distance: FloatArray
     cost: float
 
+    @property
+    def far(self) -> float:
+        """The mean distance of the body from what the scan shows of it [m]."""
+        return float(self.distance[np.isfinite(self.distance)].mean())
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Scan:

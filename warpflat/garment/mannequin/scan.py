@@ -71,7 +71,7 @@ def attributes_on_scan(
     return {
         "layout": layout,
         "vertices": average_sides(made, layout) if options.symmetric else made,
-        "source": f"scan of a body {read.body.stature:.3f} m tall; the body model lies {1000.0 * read.laid.far:.1f} mm off it in the mean",
+        "source": f"scan of a body {read.body.stature:.3f} m tall; the body model lies {1e3 * read.laid.fit.far:.1f} mm off it in the mean",
         "notes": (*read.notes, *told, *guess_note(measures, read.found), *missing_note(measures), *sides),
         "sections": {level: float(np.interp(levels[level], t.y, t.length)) for level in RING_LEVELS},
         "measures": measures,

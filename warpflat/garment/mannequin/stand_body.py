@@ -103,11 +103,6 @@ class StandingBody:
         """Whether the mannequin stands otherwise than the scan."""
         return self.vertices is not self.posed
 
-    @property
-    def far(self) -> float:
-        """The mean distance of the model from what the scan shows of it [m]."""
-        return float(np.mean(self.fit.distance[np.isfinite(self.fit.distance)]))
-
     def shows(self, rows: NDArray[np.int64]) -> bool:
         """Return whether the scan shows the most of some vertices."""
         return bool(self.seen[rows].mean() > 0.5)
@@ -343,9 +338,8 @@ def _unsure(
 
     It is no good if it lies far from the scan, or one of the two has parts that the other has not.
     """
-    mean = float(fit.distance[np.isfinite(fit.distance)].mean())
-    if mean > _FAR:
-        return f"the body model lies {1000.0 * mean:.0f} mm off the scan in the mean", True
+    if fit.far > _FAR:
+        return f"the body model lies {1000.0 * fit.far:.0f} mm off the scan in the mean", True
     near = (
         np.linalg.norm(Mesh(model, BodyModel.load().triangles).closest(scan.vertices)[2] - scan.vertices, axis=1)
         < _BESIDE
