@@ -181,8 +181,8 @@ def turn_dart(scene: Scene, dart: str, into: str, garment: FormGarment) -> Scene
         return scene_with(scene, cuts=[*_cuts_without(scene, old, keep=True), pleat])
     # The edges at the mouths of the dart and of its mirror image, and how wide these are.
     sewn, taken = plan_form(form).seams, dict[tuple[str, str], float]()
-    for placed in form.darts:
-        if placed.asked.place == old.place and (placed.piece, placed.name) in form.legs():
+    for placed, _ in form.sewn_darts():
+        if placed.asked.place == old.place:
             piece, positions = form.pieces[placed.piece], garment.pieces[placed.piece].positions
             left, right = (piece.edges[leg] for leg in piece.darts[placed.name])
             edge = next(own for own, ids in piece.edges.items() if ids[-1] == left[0])

@@ -194,13 +194,12 @@ def try_cuts(
         try:
             form = scene_form(scene, plan.mannequin)[1]
             before = plan.form.pieces
-            legs = form.legs()
-            darts = [d for d in form.darts if d.asked.place == place_of(cut) and (d.piece, d.name) in legs]
-            changed = {dart.piece for dart in darts} or set(form.pieces) - set(before)
+            darts = [(dart, legs) for dart, legs in form.sewn_darts() if dart.asked.place == place_of(cut)]
+            changed = {dart.piece for dart, _ in darts} or set(form.pieces) - set(before)
             made = _flatten(plan, [name for name in form.pieces if name in changed], scene)
         except InputError as reason:
             raise InputError(str(reason).removeprefix(f"{scene.where}: ")) from None
-        paths = [form.vertices[dart.row] for dart in darts]
+        paths = [form.vertices[dart.row] for dart, _ in darts]
         paths += [
             form.pieces[seam.pieces[0]].surface.vertices[run.vertices[0]]
             for seam in form.seams
@@ -212,7 +211,7 @@ def try_cuts(
             [garment.pieces[name] for name in before if name in changed or name not in form.pieces],
             list(made.pieces.values()),
             paths=paths,
-            cracks=[(made.pieces[d.piece], *legs[d.piece, d.name]) for d in darts],
+            cracks=[(made.pieces[dart.piece], *legs) for dart, legs in darts],
             cut=cut,
         )
 

@@ -60,10 +60,7 @@ def pleat_depths(form: FormResult) -> dict[tuple[str, str], float]:
 def dart_constraints(form: FormResult) -> list[DartMouth]:
     """Return the widths of mouths that the form asks for."""
     found = []
-    legs = form.legs()
-    for dart in form.darts:
-        if (dart.piece, dart.name) not in legs:
-            continue
+    for dart, _ in form.sewn_darts():
         if dart.asked.mouth_mm is not None:
             found.append(DartMouth(piece=dart.piece, dart=dart.name, width=1e-3 * dart.asked.mouth_mm))
         elif dart.asked.like is not None:
@@ -80,17 +77,14 @@ def closed_darts(form: FormResult, positions: Mapping[str, FloatArray]) -> list[
         positions: by piece, #V by 2, its pattern [m].
     """
     found = []
-    legs = form.legs()
-    for dart in form.darts:
-        if (dart.piece, dart.name) not in legs or dart.asked in found:
-            continue
-        left, right = (positions[dart.piece][leg] for leg in legs[dart.piece, dart.name])
+    for dart, legs in form.sewn_darts():
+        left, right = (positions[dart.piece][leg] for leg in legs)
         # The tips of a fish-eye dart may close a little.
         overlap = open_length(left, right)[1]
         most = OVERLAP if dart.name in form.pieces[dart.piece].fisheyes else CLOSED
         if overlap > most or np.linalg.norm(left - right, axis=1).max() < _NARROW:
             found.append(dart.asked)
-    return found
+    return list(dict.fromkeys(found))
 
 
 def crowded_darts(form: FormResult, positions: Mapping[str, FloatArray]) -> list[FormDart]:
@@ -99,21 +93,18 @@ def crowded_darts(form: FormResult, positions: Mapping[str, FloatArray]) -> list
     Args and darts as of :func:`closed_darts`; one whose mouth lies on the armhole itself is none of them.
     """
     found = []
-    legs = form.legs()
-    for dart in form.darts:
-        if (dart.piece, dart.name) not in legs or dart.asked in found:
-            continue
+    for dart, legs in form.sewn_darts():
         piece, flat = form.pieces[dart.piece], positions[dart.piece]
         armholes = [ids for edge, ids in piece.edges.items() if piece.whole(edge).startswith("armhole")]
-        if dart.name in piece.fisheyes or any(np.isin(legs[dart.piece, dart.name], ids).any() for ids in armholes):
+        if dart.name in piece.fisheyes or any(np.isin(legs, ids).any() for ids in armholes):
             continue
         away = [
             np.linalg.norm(nearest_on_polyline(point, flat[ids]) - point)
-            for ids in armholes for leg in legs[dart.piece, dart.name] for point in flat[leg]
+            for ids in armholes for leg in legs for point in flat[leg]
         ]  # fmt: skip
         if min(away, default=np.inf) < NEAR_ARMHOLE:
             found.append(dart.asked)
-    return found
+    return list(dict.fromkeys(found))
 
 
 def measure_darts(form: FormResult, name: str, positions: FloatArray) -> list[dict[str, Any]]:

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from warpflat.garment.construction.edges import lengths_of
 from warpflat.garment.construction.form_garment import FormGarment
 from warpflat.garment.construction.girths import drawn_in
 from warpflat.garment.construction.line_drawing import bands_of
@@ -74,10 +75,8 @@ def garment_files(
     seams, (pattern,) = [seam.as_dict() for seam in sample.seams], made
     cut = {seam.name: seam for seam in pattern.seams}
     for seam in (each for each in seams if each["name"] in cut):
-        lengths = [
-            sum(1e3 * pattern.piece(side.piece, pattern.sample).edge(side.edge).length for side in row)
-            for row in cut[seam["name"]].of_size(pattern.sample).sides
-        ]
+        sides = cut[seam["name"]].of_size(pattern.sample).sides
+        lengths = [sum(1e3 * length for length in lengths_of(pattern, row)) for row in sides]
         if all(length < flat - _SHORTER for length, flat in zip(lengths, seam["length_mm"], strict=True)):
             seam["length_mm"] = lengths
     bands = bands_of(pattern, pattern.sample)

@@ -153,9 +153,10 @@ class FormResult:
     layout: Layout = field(repr=False)
     bricks: Mapping[str, Sequence[str]] = field(repr=False)
 
-    def legs(self) -> dict[tuple[str, str], tuple[IntArray, IntArray]]:
-        """Return the legs of every dart that the pieces have, by piece and dart; half pieces have those on the left."""
-        return {(name, dart): legs for name, piece in self.pieces.items() for dart, legs in piece.legs().items()}
+    def sewn_darts(self) -> list[tuple[PlacedDart, tuple[IntArray, IntArray]]]:
+        """Return the darts that the pieces have, each with its legs; half pieces have those on the left."""
+        legs = {name: piece.legs() for name, piece in self.pieces.items()}
+        return [(dart, legs[dart.piece][dart.name]) for dart in self.darts if dart.name in legs.get(dart.piece, {})]
 
     def seam_of_edges(self) -> dict[tuple[str, str], str]:
         """Return the seams of the edges that are sewn, by piece and edge."""
