@@ -40,7 +40,9 @@ def test_a_drawing_is_draped(tube: Path, tmp_path: Path, capsys: pytest.CaptureF
     # The drape is kept; the correction needs one at rest.
     assert "the pattern was not corrected, as the drape is not at rest" in printed.err
     assert "the drape is not at rest after 100 steps" in printed.err
-    assert "woven is taken" in printed.err
+    # As of a scene, notes are one line without -v, and all of them with it.
+    assert "; -v lists them" in printed.err
+    assert len(printed.err.splitlines()) == 2
     assert printed.out.startswith("does not fit as draped: the draped cloth is not at rest\n")
     names = {"back.draped.obj", "drape.png", "drape.webp", "frames.usdc", "front.draped.obj", "metrics.json"}
     names |= {"worn.usdc"}
@@ -116,8 +118,9 @@ def test_a_pattern_from_a_file_is_corrected(tmp_path: Path, capsys: pytest.Captu
         "max_steps = 3000\ncorrect = true\n"
     )
     command = ["drape", str(tmp_path / "narrow.json"), "--seams", str(table)]
-    assert main([*command, "--out", str(out)]) == 0
+    assert main([*command, "--out", str(out), "-v"]) == 0
     printed = capsys.readouterr()
+    assert "woven is taken" in printed.err
     assert "corrected in 1 round: " in printed.err
     assert "of the cloth was stretched beyond its limit, now" in printed.err
     # Quiet, the same drape prints nothing.
