@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
+from warpflat.app.cli.options import files_line
 from warpflat.app.review.figures import aligned, relaxation_words, seam_figures
 from warpflat.core import energy_words
 from warpflat.flat import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_names
@@ -111,7 +111,7 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
         tables.append(f"cut from {'; '.join(parts)}")
     if taken := metrics.get("pattern_of_file"):
         tables.append(f"pattern: {cut_words(taken)}")
-    listed = f"{shlex.quote(folder)}: {', '.join(files)}"
+    listed = files_line(folder, files)
     return "\n\n".join(tables) + f"\n{listed}" if tables else listed
 
 
