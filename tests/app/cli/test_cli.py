@@ -265,7 +265,9 @@ def test_paths_that_are_no_mesh(command: Command):
     Path("cloth.obj").write_text(SQUARE)
     Path("cloth.shape").write_text(SQUARE)
     assert "folder" in command("flatten", "folder.obj", "--units", "m").refusal
-    assert "absent.obj" in command("flatten", "absent.obj", "--units", "m").refusal
+    told = command("flatten", "absent.obj", "--units", "m").refusal
+    assert "absent.obj: does not exist" in told
+    assert command("flatten", "absent.obj", "--units", "m", "--seams", "auto").refusal == told
     assert ".obj" in command("flatten", "cloth.shape", "--units", "m").refusal
     assert "is a directory" in command("run", "folder.obj").refusal
     assert "no such file" in command("run", "absent.toml").refusal
