@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import runpy
 from pathlib import Path
@@ -24,8 +23,6 @@ from warpflat.garment.construction import to_pattern
 from warpflat.pattern.files.beside import Beside
 
 SCENES = Path(__file__).parents[3] / "scenes"
-DATA = os.environ.get("WARPFLAT_DATA")
-needs_data = pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: the folder with the real meshes")
 
 PLANE_OBJ = "v 0 0 0\nv 10 0 0\nv 10 10 0\nv 0 10 0\nv 20 0 0\nv 20 10 0\nf 1 2 3 4\nf 2 5 6 3\n"
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 from devices import DEVICE
 from numpy.typing import NDArray
+from real_files import needs_data
 from surface_meshes import quads_between
 
 import warpflat
@@ -29,8 +29,6 @@ from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.flat.surface.shapes import make_shape
 from warpflat.pattern.export.piece_files import save_piece
 
-DATA = os.environ.get("WARPFLAT_DATA")
-needs_data = pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: the folder with the real meshes")
 SCENES = Path(__file__).parents[3] / "scenes"
 
 
