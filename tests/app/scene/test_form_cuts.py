@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import tomllib
 
 from warpflat.app.cli.main import main
 from warpflat.app.scene.form import scene_form
@@ -19,6 +18,7 @@ from warpflat.app.scene.plan import plan_form_scene
 from warpflat.app.scene.run import run_scene
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, polyline_length
+from warpflat.core.toml_file import tomllib
 from warpflat.garment.construction.garment_files import garment_files
 from warpflat.pattern.export.pattern_files import PatternOptions
 from warpflat.pattern.export.pattern_json import read_pattern_json

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
@@ -24,7 +23,7 @@ from warpflat.app.scene.run import run_scene
 from warpflat.app.scene.wardrobe import garment_offer, offers, scene_text
 from warpflat.core.polyline import polyline_length
 from warpflat.core.text import other_side
-from warpflat.core.toml_file import read_toml
+from warpflat.core.toml_file import read_toml, tomllib
 from warpflat.flat.fabric.library import load_library
 from warpflat.garment.construction.linings import add_interfacing, add_lining
 from warpflat.garment.construction.to_pattern import pattern_of_garment
@@ -39,11 +38,6 @@ from warpflat.pattern.drafting.sewing_tasks import techniques
 from warpflat.pattern.drafting.words import language_words, printed_in
 from warpflat.pattern.export.pattern_files import export_patterns
 from warpflat.pattern.export.pattern_json import read_pattern_json
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 SCENES = Path(__file__).parents[3] / "scenes"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
@@ -10,11 +9,7 @@ import pytest
 from warpflat.app.scene.load import Scene, make_scene
 from warpflat.app.scene.wardrobe import garment_offer, offers, scene_text
 from warpflat.core.errors import InputError
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from warpflat.core.toml_file import tomllib
 
 SCENES = Path(__file__).parents[3] / "scenes"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 from contextlib import suppress
 from dataclasses import replace
@@ -27,11 +26,7 @@ from warpflat.app.studio.session import Session
 from warpflat.app.studio.solve import solve
 from warpflat.app.studio.worker import Job, Superseded, Ticket, Worker
 from warpflat.core.errors import InputError
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from warpflat.core.toml_file import tomllib
 
 SCENES = sorted((Path(__file__).parents[3] / "scenes").glob("*.toml"))
 
