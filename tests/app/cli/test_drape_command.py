@@ -11,7 +11,6 @@ import pytest
 from polygons import corners_of, drafted, polygon, sewn
 
 from warpflat.app.cli.main import main
-from warpflat.garment.draping.write import files_of_drape
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.export.pattern_json import write_pattern_json
 from warpflat.pattern.export.read_svg import read_svg
@@ -48,12 +47,6 @@ def test_a_drawing_is_draped(tube: Path, tmp_path: Path, capsys: pytest.CaptureF
     names |= {"worn.usdc"}
     assert {path.name for path in out.iterdir()} == names
     assert json.loads((out / "metrics.json").read_text())["drape"]["compared_with"] == "body"
-
-
-def test_help_names_each_file_of_a_drape(capsys: pytest.CaptureFixture[str]):
-    assert main(["drape", "--help"]) == 0
-    printed = capsys.readouterr().out
-    assert all(name in printed for name in files_of_drape(["NAME"], picture=True, frames=True, usd=True))
 
 
 @pytest.mark.parametrize(
