@@ -217,6 +217,15 @@ def test_the_command_makes_a_cut_of_a_form(tmp_path: Path, capsys: pytest.Captur
     assert "beyond the limit" in capsys.readouterr().out
 
 
+def test_an_edit_that_is_not_at_rest_is_told_as_a_run_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    (tmp_path / "b.toml").write_text(
+        'form = "bodice"\nshape = "darts"\nhalf = true\n[mannequin]\nsize = "EU 38"\nresolution_mm = 40\n[relax]\nmax_steps = 5\n'
+    )
+    turned = ("--turn", "front.waist dart", "nothing", "--out", str(tmp_path / "out"), "-q")
+    assert main(["cuts", str(tmp_path / "b.toml"), *turned]) == 1
+    assert "warpflat: front did not converge within " in capsys.readouterr().err
+
+
 def test_the_advice_of_a_run_can_be_pasted(tmp_path: Path):
     quiet = {"output": {"frames": 0, "picture": False}, "pattern": {"formats": []}}
     wear = run_scene(scene(mannequin={"size": "EU 38", "resolution_mm": 20}, **quiet), tmp_path).metrics["pieces"][

@@ -9,7 +9,16 @@ from typing import Literal
 
 import click
 
-from warpflat.app.cli.options import DONE, EXIT_CODES, FAULTY, ComputingCommand, Output, files_line, output_options
+from warpflat.app.cli.options import (
+    DONE,
+    EXIT_CODES,
+    FAULTY,
+    ComputingCommand,
+    Output,
+    files_line,
+    output_options,
+    tell,
+)
 from warpflat.app.cli.run import report_run, start_warp_silently
 from warpflat.core import InputError
 
@@ -69,6 +78,7 @@ def cuts(
     if edits:
         # Edit a dart, and compare the garment before and after.
         from warpflat.app.cli.tables import edit_table
+        from warpflat.app.review.faults import faults_of
         from warpflat.app.scene.form_edits import edit_dart
         from warpflat.pattern import output_folder, write_report
 
@@ -87,11 +97,14 @@ def cuts(
             _write_toml(folder, "The scene's cuts and seams after the edit, instead of its own.", [made.as_toml()])
             write_report(folder / "edit.json", data, name="edit", files=["cuts.toml"])
         output.tell_notes(made.notes)
+        warnings = faults_of(made.after.metrics())
+        for line in warnings:
+            tell(line)
         output.report(
             folder / "edit.json",
             lambda: [edit_table(data), "", made.as_toml(), files_line(folder, ["edit.json", "cuts.toml"])],
         )
-        return DONE if data["after"]["converged"] else FAULTY
+        return FAULTY if warnings else DONE
     if at is not None:
         raise InputError("--at belongs to --rotate and --split")
     from warpflat.app.cli.progress_bar import ProgressBar
