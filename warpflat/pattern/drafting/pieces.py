@@ -355,8 +355,8 @@ class Pattern:
                         )
                     if edge.kind == "fold":
                         raise InputError(f"seam {seam.name!r}: edge {side} lies on the fold and cannot be sewn")
-        if self.sample_size is not None and self.sample_size not in self.pieces:
-            raise unknown_size(self.name, self.sample_size, self.pieces)
+        if self.sample_size is not None:
+            self.check_size(self.sample_size)
         seen = [seam.name for seam in self.seams]
         if len(set(seen)) < len(seen):
             raise InputError(f"garment {self.name!r}: a seam's name occurs twice; names are unique")

@@ -57,17 +57,16 @@ def garmentcode_json(garment: DraftedGarment, *, size: str | None = None) -> tup
     Raises:
         InputError: an unknown size, or a piece that cannot be unfolded.
     """
-    chosen = garment.pattern.sample if size is None else size
-    garment.pattern.check_size(chosen)
+    chosen = garment.of_sizes([garment.sample if size is None else size])
     left_out = [
         f"{piece.name}: GarmentCode knows no {what}: {', '.join(names)} left out"
-        for piece in garment.pieces[chosen]
+        for piece in chosen
         for what, names in (("holes", [*piece.cutouts, *piece.fisheyes]), ("lines inside", piece.internal_lines))
         if names
     ]
     # Pieces are along their drawn lines, in their plane, without what GarmentCode does not know.
     drawn = list[Piece]()
-    for drafted in garment.pieces[chosen]:
+    for drafted in chosen:
         own, frame = drafted.piece, np.vstack([drafted.frame, [0.0, 0.0, 1.0]])
         drawn.append(
             replace(

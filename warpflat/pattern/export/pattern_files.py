@@ -291,7 +291,7 @@ def write_pattern(
             )
         if not_drawn:
             return WrittenPattern(notes=tuple(not_drawn), metrics={"pattern": {"not_drawn": _reason(not_drawn[0])}})
-        pieces = [piece for row in drafted.pieces.values() for piece in row]
+        pieces = list(drafted)
         ragged: dict[str, float] = {}
         for piece in pieces:
             for edge in piece.edges:
@@ -311,7 +311,7 @@ def write_pattern(
         walked = walk_seams(drafted)
         drafted = enlarged(drafted, options.shrinkage, next(iter(pattern)).fabric)
         near = [seam.local_mm for seam in drafted.seams if seam.local_mm is not None]
-        edges = [edge for row in drafted.pieces.values() for piece in row for edge in piece.edges]
+        edges = [edge for piece in drafted for edge in piece.edges]
         cloths = cut_list(drafted.pieces[drafted.pattern.sample])
         metrics: dict[str, Any] = {
             # How far curves stray from the mesh, and sides of seams from each other, at worst.
@@ -441,9 +441,7 @@ def _marker(
     from warpflat.pattern.export.svg import write_marker_svg
 
     report_activity(f"laying the marker, {seconds} s at most")
-    cloths = list(
-        dict.fromkeys(each for row in drafted.pieces.values() for piece in row for each in piece.piece.cloths)
-    )
+    cloths = list(dict.fromkeys(each for piece in drafted for each in piece.piece.cloths))
     names, remarks, plans, stems = list[str](), list[str](), list[dict[str, Any]](), list[str]()
     for number, fabric in enumerate(cloths):
         own = cloth if number == 0 else replace(cloth, stripes=Stripes())

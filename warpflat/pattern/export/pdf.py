@@ -86,10 +86,7 @@ def write_pdf(
     with printed_in(garment.pattern.words):
         if paper not in PAPERS:
             raise InputError(f"unknown paper {paper!r}; {nearest(paper, PAPERS)}")
-        chosen = tuple(garment.pieces) if sizes is None else tuple(sizes)
-        for size in chosen:
-            garment.pattern.check_size(size)
-        whole = replace(garment, pieces={size: row for size, row in garment.pieces.items() if size in chosen})
+        whole = garment.of_sizes(sizes)
         printed = halved(whole)
         if fault := too_many_sheets(printed, paper):
             raise InputError(f"{path}: {fault}")
@@ -217,7 +214,7 @@ def too_many_sheets(garment: DraftedGarment, paper: str) -> str:
     step = float(np.prod(PAPERS[paper].step))
 
     def sheets_of(drafted: DraftedGarment) -> float:
-        return sum(shapely.Polygon(piece.cut_line).area for row in drafted.pieces.values() for piece in row) / step
+        return sum(shapely.Polygon(piece.cut_line).area for piece in drafted) / step
 
     sheets = sheets_of(garment)
     sheets = sheets_of(halved(garment)) if sheets > MOST_SHEETS else sheets
