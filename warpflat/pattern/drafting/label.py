@@ -207,6 +207,9 @@ def cutting_words(piece: Piece, count: int) -> str:
     return translate("Cut {count}", count=count)
 
 
-def printed_size(size: str) -> str:
-    """Return the words for a size as they are printed."""
+def printed_size(*sizes: str) -> str:
+    """Return the words for a size, or for several, as they are printed."""
+    if len(sizes) > 1:
+        return translate("sizes {sizes}", sizes=", ".join(sizes))
+    (size,) = sizes
     return translate("size {size}", size=size) if size_words(size) != size else translate(size)
