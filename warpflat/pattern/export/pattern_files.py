@@ -267,7 +267,6 @@ def write_pattern(
     from warpflat.pattern.drafting.draft import draft_garment
     from warpflat.pattern.drafting.seam_difference import LOCAL_TOLERANCE
     from warpflat.pattern.drafting.walked import walk_seams
-    from warpflat.pattern.export.pdf import too_many_sheets
 
     _check_formats(options.formats)
     if options.tolerance is not None and not (is_number(options.tolerance) and options.tolerance >= 0.0):
@@ -278,7 +277,7 @@ def write_pattern(
     heard = list[LeftOut]()
     with listening_to_left_out(heard.append):
         with optional_step("no pattern was drawn", folder=Path(to)) as not_drawn:
-            pattern, notes = make()
+            pattern, known = make()
             # In the printed names and units that were asked for.
             titled = {
                 size: tuple(
@@ -291,23 +290,20 @@ def write_pattern(
             )
         if not_drawn:
             return WrittenPattern(notes=tuple(not_drawn), metrics={"pattern": {"not_drawn": _reason(not_drawn[0])}})
-        pieces = list(drafted)
-        ragged: dict[str, float] = {}
-        for piece in pieces:
+        notes, ragged = list(known), dict[str, float]()
+        for piece in drafted:
             for edge in piece.edges:
                 if options.tolerance is None and edge.tolerance > TOLERANCE:
                     name_of = f"{piece.name}.{edge.name}"
                     ragged[name_of] = max(ragged.get(name_of, 0.0), edge.fit_error)
         if ragged:
             within = max(ragged.values()) * 1000
-            notes = (
-                *notes, f"the border is ragged at {', '.join(ragged)}: the curves keep within {within:.1f} mm of it",
-            )  # fmt: skip
-        notes = (*notes, *(f"{piece.name}: {note}" for piece in pieces for note in piece.notes))
+            notes.append(f"the border is ragged at {', '.join(ragged)}: the curves keep within {within:.1f} mm of it")
+        notes += [f"{piece.name}: {note}" for piece in drafted for note in piece.notes]
         missed = [
             seam for seam in drafted.seams if seam.notches_mm is not None and seam.notches_mm > 1000 * LOCAL_TOLERANCE
         ]
-        notes = (*notes, *(f"{seam.name}: its notches miss each other by {seam.notches_mm:.1f} mm" for seam in missed))
+        notes += [f"{seam.name}: its notches miss each other by {seam.notches_mm:.1f} mm" for seam in missed]
         walked = walk_seams(drafted)
         drafted = enlarged(drafted, options.shrinkage, next(iter(pattern)).fabric)
         near = [seam.local_mm for seam in drafted.seams if seam.local_mm is not None]
@@ -333,28 +329,36 @@ def write_pattern(
                 for seam in drafted.seams
             ],
         }
-        refused = too_many_sheets(drafted, options.paper) if "pdf" in options.formats else ""
-        notes = (*notes, f"pattern.pdf was left out: {refused}") if refused else notes
-        with output_folder(to) as folder:
-            files = list[str]()
-            for kind in FORMATS:
-                if kind in options.formats and not (kind == "pdf" and refused):
-                    with optional_step(f"{FORMATS[kind].format(name)} was left out", folder=folder):
-                        written, lost = _write(
-                            drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper
-                        )
-                        files += written
-                        notes = (*notes, *lost)
-            if options.cloth is not None:
-                with optional_step("no marker was made", folder=folder) as not_made:
-                    marked, remarks, plans = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
-                    files += marked
-                    notes = (*notes, *remarks)
-                    metrics["marker"] = plans[0]
-                if not_made:
-                    metrics["marker"] = {"not_made": _reason(not_made[0])}
-    notes = (*notes, *(step.note for step in heard))
-    return WrittenPattern(files=tuple(files), notes=tuple(dict.fromkeys(notes)), metrics=metrics, walked=walked)
+        written = _write_files(drafted, to, name=name, options=options)
+    notes += [*written.notes, *(step.note for step in heard)]
+    return replace(written, notes=tuple(dict.fromkeys(notes)), metrics={**metrics, **written.metrics}, walked=walked)
+
+
+def _write_files(drafted: DraftedGarment, to: str | Path, *, name: str, options: PatternOptions) -> WrittenPattern:
+    """Write the files of a drafted pattern, and its marker, whose measures are the metrics; what cannot be written is left out."""
+    from warpflat.pattern.export.pdf import too_many_sheets
+
+    files, notes, metrics = list[str](), list[str](), dict[str, Any]()
+    refused = too_many_sheets(drafted, options.paper) if "pdf" in options.formats else ""
+    notes += [f"pattern.pdf was left out: {refused}"] if refused else []
+    with output_folder(to) as folder:
+        for kind in FORMATS:
+            if kind in options.formats and not (kind == "pdf" and refused):
+                with optional_step(f"{FORMATS[kind].format(name)} was left out", folder=folder):
+                    written, lost = _write(
+                        drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper
+                    )
+                    files += written
+                    notes += lost
+        if options.cloth is not None:
+            with optional_step("no marker was made", folder=folder) as not_made:
+                marked, remarks, plans = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
+                files += marked
+                notes += remarks
+                metrics["marker"] = plans[0]
+            if not_made:
+                metrics["marker"] = {"not_made": _reason(not_made[0])}
+    return WrittenPattern(files=tuple(files), notes=tuple(notes), metrics=metrics)
 
 
 def pattern_names(name: str, formats: Iterable[str], *, marker: bool = False) -> list[str]:
