@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -229,6 +229,10 @@ class DraftedGarment:
             if sizes is None
             else replace(self, pieces={size: self.pieces[size] for size in self.pieces if size in sizes})
         )
+
+    def with_each(self, change: Callable[[DraftedPiece], DraftedPiece]) -> DraftedGarment:
+        """Return the garment with a change made to each of its pieces, in all sizes."""
+        return replace(self, pieces={size: tuple(map(change, row)) for size, row in self.pieces.items()})
 
     def __iter__(self) -> Iterator[DraftedPiece]:
         for pieces in self.pieces.values():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
@@ -365,6 +365,10 @@ class Pattern:
     def sizes(self) -> tuple[str, ...]:
         """Sizes in their order."""
         return tuple(self.pieces)
+
+    def with_each(self, change: Callable[[Piece], Piece]) -> Pattern:
+        """Return the pattern with a change made to each of its pieces, in all sizes."""
+        return replace(self, pieces={size: tuple(map(change, row)) for size, row in self.pieces.items()})
 
     def without(self, names: Collection[str]) -> Pattern:
         """Return the pattern without pieces of these names, and without their seams.

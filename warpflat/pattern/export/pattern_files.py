@@ -279,15 +279,10 @@ def write_pattern(
         with optional_step("no pattern was drawn", folder=Path(to)) as not_drawn:
             pattern, known = make()
             # In the printed names and units that were asked for.
-            titled = {
-                size: tuple(
-                    replace(piece, title=options.names.get(piece.name, ""), units=options.units) for piece in row
-                )
-                for size, row in pattern.pieces.items()
-            }
-            drafted = draft_garment(
-                replace(pattern, pieces=titled, words=options.words), tolerance=options.tolerance, true=options.true
+            pattern = replace(pattern, words=options.words).with_each(
+                lambda piece: replace(piece, title=options.names.get(piece.name, ""), units=options.units)
             )
+            drafted = draft_garment(pattern, tolerance=options.tolerance, true=options.true)
         if not_drawn:
             return WrittenPattern(notes=tuple(not_drawn), metrics={"pattern": {"not_drawn": _reason(not_drawn[0])}})
         notes, ragged = list(known), dict[str, float]()
