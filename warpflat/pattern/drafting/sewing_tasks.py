@@ -380,7 +380,7 @@ class SewingTasks:
         self._add("hang", [name for name in shell if is_flounce(self.pieces[name])])
         for technique, kind in (("hem", "hem"), ("bind_raw", "seam"), ("raw", "cut")):
             self._add(technique, [], self._take_of(self.pieces, (kind,)))
-        self._close(list(self.drafted.values()))
+        self._close()
 
     def _finish_parts(self, joined: Collection[str]) -> None:
         """Add interfacings, ties, darts, pockets, straps and plackets."""
@@ -450,9 +450,9 @@ class SewingTasks:
         notion = translate(f"{{count}} {word} of {{length}}, at most {{width}} wide", count=elastic.count, **values)
         self.tasks[-1].notions.append(notion)
 
-    def _close(self, drafted: Sequence[DraftedPiece]) -> None:
+    def _close(self) -> None:
         """Add what closes the garment, with its notions: zips, buttons, hooks."""
-        zipped = False
+        drafted, zipped = list(self.drafted.values()), False
         # Zips that run on beyond the lower end of their seam.
         running = {
             (each.style, each.length): each.begin

@@ -90,11 +90,11 @@ def whole_pieces(
         taken |= edges
         found.append(plain)
     for piece in whole.values():
-        darts = [(dart.name, dart.left, dart.right) for dart in piece.darts]
-        darts += [(hole.name, f"{hole.name} left", f"{hole.name} right") for hole in piece.holes if hole.kind == "dart"]
-        for name, left, right in darts:
-            legs = SeamSide(piece=piece.name, edge=left), SeamSide(piece=piece.name, edge=right, reversed=True)
-            found.append(Seam(name=f"{piece.name}.{name}", sides=((legs[0],), (legs[1],))))
+        found += piece.dart_seams
+        for eye in (hole for hole in piece.holes if hole.kind == "dart"):
+            left = SeamSide(piece=piece.name, edge=f"{eye.name} left")
+            right = SeamSide(piece=piece.name, edge=f"{eye.name} right", reversed=True)
+            found.append(Seam(name=f"{piece.name}.{eye.name}", sides=((left,), (right,))))
     left_out = sorted(set(given) - sewn)
     notes = [f"left out, as no seam joins them: {', '.join(left_out)}"] if left_out else []
     return whole, found, notes
