@@ -16,7 +16,7 @@ from warpflat.core.errors import InputError
 from warpflat.pattern.drafting.marker import Cloth, make_marker
 from warpflat.pattern.export.dxf import write_dxf
 from warpflat.pattern.export.garmentcode import write_garmentcode
-from warpflat.pattern.export.pattern_json import pattern_json, write_pattern_json
+from warpflat.pattern.export.pattern_json import pattern_json, read_pattern_json, write_pattern_json
 from warpflat.pattern.export.pdf import write_pdf
 from warpflat.pattern.export.plt import write_plt
 from warpflat.pattern.export.svg import STYLE, write_marker_svg, write_svg
@@ -195,3 +195,9 @@ def test_a_size_that_is_not_drafted_is_refused(dress, size, tmp_path):
     with pytest.raises(InputError, match=f"no size '{size}'"):
         write_garmentcode(drafted, tmp_path / "p.json", size=size)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_drafted_of_some_sizes_is_read_back(dress, tmp_path):
+    assert dress.sample == "38"
+    write_pattern_json(dress.of_sizes(["36"]), tmp_path / "pattern.json")
+    assert read_pattern_json(tmp_path / "pattern.json").sample == "36"

@@ -303,7 +303,7 @@ def write_pattern(
         drafted = enlarged(drafted, options.shrinkage, next(iter(pattern)).fabric)
         near = [seam.local_mm for seam in drafted.seams if seam.local_mm is not None]
         edges = [edge for piece in drafted for edge in piece.edges]
-        cloths = cut_list(drafted.pieces[drafted.pattern.sample])
+        cloths = cut_list(drafted.pieces[drafted.sample])
         metrics: dict[str, Any] = {
             # How far curves stray from the mesh, and sides of seams from each other, at worst.
             "pattern": {
