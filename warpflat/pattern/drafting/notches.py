@@ -9,7 +9,7 @@ import numpy as np
 from warpflat.core import FloatArray, arc_lengths, points_at_lengths, unit
 from warpflat.pattern.drafting.allowance import CutOutline
 from warpflat.pattern.drafting.drafted import DraftedPiece, Notch, SeamReport
-from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
+from warpflat.pattern.drafting.pieces import Piece, Place, Seam, SeamSide
 from warpflat.pattern.drafting.seam_difference import (
     LOCAL_TOLERANCE,
     eased_length,
@@ -97,7 +97,7 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
     """
     lines = [[SeamLine(side, pieces) for side in seam.sides] for seam in seams]
     # Where each edge is sewn: number and side of the seam, place in that side.
-    sewn: dict[tuple[str, str], list[tuple[int, int, int]]] = {}
+    sewn: dict[Place, list[tuple[int, int, int]]] = {}
     for number, seam in enumerate(seams):
         for at, row in enumerate(seam.sides):
             for place, side in enumerate(row):
@@ -187,7 +187,7 @@ def opposite_length(seam: Seam, lines: Sequence[SeamLine], side: int, length: fl
 def copied_together(seams: Sequence[Seam]) -> dict[str, str]:
     """Return by seam the first of all seams that are sewn along copies of its edges, each of which is drawn once."""
     first: dict[str, str] = {seam.name: seam.name for seam in seams}
-    at: dict[tuple[str, str], dict[tuple[bool, int], str]] = {}
+    at: dict[Place, dict[tuple[bool, int], str]] = {}
     for seam in seams:
         for side in seam.stretches:
             at.setdefault(side.place, {}).setdefault((side.mirrored, side.copy), seam.name)

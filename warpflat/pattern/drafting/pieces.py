@@ -18,11 +18,24 @@ from warpflat.pattern.drafting.seam_difference import eased_length
 from warpflat.pattern.drafting.words import translate_name
 from warpflat.pattern.drafting.worn import Worn
 
-__all__ = ["Elastic", "OpeningKind", "Pattern", "Piece", "Role", "Seam", "SeamSide", "check_hole", "unknown_size"]
+__all__ = [
+    "Elastic",
+    "OpeningKind",
+    "Pattern",
+    "Piece",
+    "Place",
+    "Role",
+    "Seam",
+    "SeamSide",
+    "check_hole",
+    "unknown_size",
+]
 
 
 #: Kinds of :class:`SeamOpening`.
 OpeningKind = Literal["zip", "buttons", "slit", "vent"]
+#: Names of a piece and of an edge of it.
+Place = tuple[str, str]
 #: What a piece is, or is derived as.
 Role = Literal[
     "shell", "facing", "strip", "waistband", "cuff", "collar", "hood", "lining", "interfacing", "pocket", "placket", "tie", "fly"
@@ -185,7 +198,7 @@ class SeamSide:
     copy: int = 0
 
     @property
-    def place(self) -> tuple[str, str]:
+    def place(self) -> Place:
         """Names of the piece and the edge."""
         return self.piece, self.edge
 

@@ -11,7 +11,7 @@ import numpy as np
 from warpflat.core import FloatArray, InputError
 from warpflat.pattern.drafting.drafted_darts import fisheye_legs
 from warpflat.pattern.drafting.piece_parts import Edge, Hole
-from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
+from warpflat.pattern.drafting.pieces import Piece, Place, Seam, SeamSide
 from warpflat.pattern.drafting.polygons import mirror_image
 
 __all__ = ["MIRRORED", "hole_edges", "turn_over", "whole_pieces"]
@@ -72,7 +72,7 @@ def whole_pieces(
             also = {cloth: max(number // count, 1) for cloth, number in piece.also.items()}
             whole[name] = replace(piece, quantity=max(piece.quantity // count, 1), paired=False, also=also)
     found: list[Seam] = []
-    taken: set[tuple[str, str]] = set()
+    taken: set[Place] = set()
     # Seams on the other side of the body.
     flipped = []
     for seam in seams:
