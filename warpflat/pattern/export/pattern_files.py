@@ -157,11 +157,13 @@ def export_patterns(
         raise InputError(
             "pattern.json holds all sizes, since the other formats are made from it: leave out the size, or take dxf, svg or pdf"
         )
+    if "garmentcode" in formats and sizes is not None and len(sizes) > 1:
+        raise InputError(f"a file of GarmentCode holds one size: give one --size, not {', '.join(sizes)}")
     with _rewritten(source, out, allowance, units, over_itself="json" in formats) as (drafted, folder, name, files):
-        notes = list(drafted.pattern.notes)
+        drafted, notes = drafted.of_sizes(sizes), list(drafted.pattern.notes)
         for format in formats:
             written, lost = _write(
-                drafted, folder, format, name=name, dialect=dialect, paper=paper, sizes=sizes, english=units == "in"
+                drafted, folder, format, name=name, dialect=dialect, paper=paper, english=units == "in"
             )
             files += written
             notes += lost
@@ -387,7 +389,6 @@ def _write(
     name: str,
     dialect: str,
     paper: str,
-    sizes: Sequence[str] | None = None,
     english: bool = False,
 ) -> tuple[list[str], tuple[str, ...]]:
     """Write one format and return the names of its files, and what it leaves out."""
@@ -404,20 +405,17 @@ def _write(
     report_activity(f"writing {file.name}")
     if kind == "dxf":
         # Of several sizes the rules by which they are graded are a file of their own.
-        graded = len(drafted.pieces if sizes is None else sizes) > 1
-        rul = file_in(folder, name, ".rul") if graded else None
+        rul = file_in(folder, name, ".rul") if len(drafted.pieces) > 1 else None
         files += [] if rul is None else [rul.name]
-        write_dxf(drafted, file, dialect=dialect, units="english" if english else "metric", sizes=sizes, rul=rul)
+        write_dxf(drafted, file, dialect=dialect, units="english" if english else "metric", rul=rul)
     elif kind == "svg":
-        write_svg(drafted, file, sizes=sizes)
+        write_svg(drafted, file)
     elif kind == "pdf":
-        write_pdf(drafted, file, paper=paper, sizes=sizes)
+        write_pdf(drafted, file, paper=paper)
     elif kind == "plt":
-        write_plt(drafted, file, sizes=sizes)
+        write_plt(drafted, file)
     elif kind == "garmentcode":
-        if sizes is not None and len(sizes) > 1:
-            raise InputError(f"a file of GarmentCode holds one size: give one --size, not {', '.join(sizes)}")
-        lost = write_garmentcode(drafted, file, size=None if sizes is None else sizes[0])
+        lost = write_garmentcode(drafted, file)
     else:
         write_pattern_json(drafted, file)
     return files, lost
