@@ -153,6 +153,16 @@ def test_stitches_that_follow_each_other_are_a_seam_across_a_dart():
     assert len(garmentcode_pattern(given, "p").seams) == 3
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_an_edge_of_less_than_a_millimetre_is_in_one_seam_wherever_its_stitches_begin(turned: bool):
+    front = panel([(0, 0), (15, 0), (15, 0.08), (15, 20), (0, 20)])
+    back = panel([(0, 0), (0, 20), (-15, 20), (-15, 0.05), (-15, 0)])
+    stitches = ["f.1 b.3", "f.2 b.2"]
+    pattern = garmentcode_pattern(file_of({"f": front, "b": back}, stitches[:: -1 if turned else 1]), "p")
+    sewn = [side for seam in pattern.seams for side in seam.stretches]
+    assert len(sewn) == len({(side.piece, side.edge) for side in sewn}) == 4
+
+
 def test_two_straight_sides_of_a_cone_are_a_seam_and_no_dart():
     cone = panel([(0.0, 0.0), (30.0, 0.0), (0.0, 30.0)], {1: {"type": "circle", "params": [30.0, 0, 1]}})
     found = garmentcode_pattern(file_of({"cone": cone}, ["cone.2 cone.0"]), "p")
