@@ -57,7 +57,7 @@ def row(file: Path, body: str, spacing: float, fabric: str, pictures: Path | Non
     except InputError as error:
         return f"refused: {error} | | | | {time.process_time() - began:.1f} | "
     if pictures is not None:
-        write_drape_picture(pictures / f"{file.stem}_{body.replace(' ', '_')}.png", worn)
+        write_drape_picture(pictures / f"{file.stem}_{Path(body).stem.replace(' ', '_')}.png", worn)
     strain = max(float(np.abs(worn.strains[name]).max()) for name in ("warp", "weft"))
     pierced = pierced_edges(worn.cloth, worn.positions)[0].mean()
     gap = float(worn.gap @ worn.areas / worn.areas.sum())

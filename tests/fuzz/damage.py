@@ -9,18 +9,14 @@ import copy
 import json
 import re
 import struct
-import sys
 from random import Random
 from typing import Any
 
 import click
 
-from .seeds import COMMANDS
+from warpflat.core.toml_file import tomllib
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from .seeds import COMMANDS
 
 __all__ = [
     "DEEP", "DIGITS", "NAMES", "WORDS", "damaged_bytes", "damaged_json", "damaged_structure", "damaged_toml", "little_work",

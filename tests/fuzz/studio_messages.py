@@ -192,7 +192,7 @@ class Studio:
         session = self.page.session
         files = {path: path.read_bytes() for path in self.folder.rglob("*") if path.is_file()}
         parts = {uuid: part.value for uuid, part in self.parts().items()}
-        return session.scene.settings, session.can_undo, session.can_redo, session.preview, session.saved, parts, files
+        return session.step, len(session._steps), session.preview, session.saved, parts, files
 
     def ask(self, request: str) -> bool:
         """Send a request as it stands; return whether it was refused."""

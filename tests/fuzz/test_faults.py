@@ -15,14 +15,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command import Command, Ended
+from real_files import DATA
 
 from warpflat.core.file_kinds import FOREIGN
 from warpflat.flat.surface.io.read import read_surface
 
-_DATA = os.environ.get("WARPFLAT_DATA")
-_FAULTS = Path(_DATA or "") / "faults"
+_FAULTS = DATA / "faults"
 pytestmark = pytest.mark.skipif(
-    not (_DATA and _FAULTS.is_dir()), reason="WARPFLAT_DATA/faults is not there: the small files that failed once"
+    not _FAULTS.is_dir(), reason="WARPFLAT_DATA/faults is not there: the small files that failed once"
 )
 
 

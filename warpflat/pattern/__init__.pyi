@@ -5,7 +5,7 @@ from .drafting.curves import curve_through as curve_through
 from .drafting.draft import draft_garment as draft_garment
 from .drafting.edge_rules import EdgeRules as EdgeRules
 from .drafting.fairing import count_inflections as count_inflections
-from .drafting.fairing import fair_line as fair_line
+from .drafting.fairing import fair_lines as fair_lines
 from .drafting.fairing import fairest_line as fairest_line
 from .drafting.fitting import drawn_length as drawn_length
 from .drafting.from_mesh import BORDERS_MEET as BORDERS_MEET

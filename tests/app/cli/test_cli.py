@@ -242,12 +242,13 @@ def test_a_mesh_that_its_reader_trips_over_is_told_in_words(command: Command):
 
 def test_a_pattern_is_exported_from_its_folder_or_its_file(command: Command):
     Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 5\n" + BARE)
-    assert command("run", "cap.toml", "--out", "out")[0] == 0
-    Path("out/cap.svg").unlink()
-    assert command("export", "out/pattern.json", "--format", "svg")[:2] == (0, "out: cap.svg\n")
-    assert Path("out/cap.svg").exists()
-    told = command("export", "out/cap.obj", "--format", "svg").refusal
-    assert told == "out/cap.obj: is a mesh, not a pattern: warpflat flatten reads it"
+    assert command("run", "cap.toml", "--out", "my out")[0] == 0
+    Path("my out/cap.svg").unlink()
+    # The folder is told as a shell takes it, by every command.
+    assert command("export", "my out/pattern.json", "--format", "svg")[:2] == (0, "'my out': cap.svg\n")
+    assert Path("my out/cap.svg").exists()
+    told = command("export", "my out/cap.obj", "--format", "svg").refusal
+    assert told == "my out/cap.obj: is a mesh, not a pattern: warpflat flatten reads it"
 
 
 def test_a_tube_is_cut_open_with_a_note_and_a_line_of_ones_own_is_checked(command: Command):
@@ -264,7 +265,9 @@ def test_paths_that_are_no_mesh(command: Command):
     Path("cloth.obj").write_text(SQUARE)
     Path("cloth.shape").write_text(SQUARE)
     assert "folder" in command("flatten", "folder.obj", "--units", "m").refusal
-    assert "absent.obj" in command("flatten", "absent.obj", "--units", "m").refusal
+    told = command("flatten", "absent.obj", "--units", "m").refusal
+    assert "absent.obj: does not exist" in told
+    assert command("flatten", "absent.obj", "--units", "m", "--seams", "auto").refusal == told
     assert ".obj" in command("flatten", "cloth.shape", "--units", "m").refusal
     assert "is a directory" in command("run", "folder.obj").refusal
     assert "no such file" in command("run", "absent.toml").refusal
@@ -295,10 +298,8 @@ def test_units_are_asked_for_and_checked(command: Command):
         (["--time-step", "nan"], "^--time-step: "),
         (["--frames", "-3"], "^--frames: should be greater than or equal to 0"),
         (["--component", "7"], "7"),
-        (["--component", "large"], "component"),
         (["--name", "a/b"], "name: 'a/b' cannot name files: .*only spaces and _ . -; 'a_b' would do"),
         (["--name", "Ärmel links"], "name: 'Ärmel links' cannot name files: .*; 'Armel links' would do"),
-        (["--device", "cuda:99"], "device|cuda:99"),
         (["--fabric-file", "none.toml"], "none.toml: no such file"),
         (["--untis", "m"], "'--untis'.*'--units'"),
     ],

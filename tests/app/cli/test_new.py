@@ -58,7 +58,6 @@ def test_scene_is_written_with_what_was_chosen(capsys: pytest.CaptureFixture[str
         (["shirt", "--size", "EU 38", "--scan", "nobody.obj"], "command line"),
         (["shirt", "--measure", "bst=0.9"], "did you mean 'bust'"),
         (["shirt", "--fabric", "wovn", "--size", "EU 38"], "did you mean 'woven'"),
-        (["pencil_skirt", "--size", "EU 38", "--neck-depth", "8"], "it has no neckline"),
         (["tote", "--size", "EU 38"], "a tote lies on no body"),
         (["tote", "--card", "card.png"], "a tote lies on no body"),
         (["shirt", "--card", "card.pdf"], "name it *.png"),

@@ -118,8 +118,6 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     told = capsys.readouterr().out
     assert "cap" in told.splitlines()[0]
     assert "compare.svg" in told.splitlines()[-1]
-    assert main(["compare", "cap.toml", "--fabric", "woven"]) == 2
-    assert "name two or more" in capsys.readouterr().err
 
 
 HEM = """datum = "centre"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -45,9 +44,10 @@ def _run(folder: Path, cuts: list[dict[str, Any]]) -> Any:
     return run_scene(make_scene(data, name="shorts", folder=folder, where="shorts.toml"), folder / "out")
 
 
-@pytest.mark.parametrize("order", [*permutations(range(3))])
-def test_cuts_of_shorts_part_them_in_any_order(order: tuple[int, ...], tmp_path: Path):
-    result = _run(tmp_path, [[CENTRE, *INSEAMS][k] for k in order])
+@pytest.mark.parametrize("at", range(3))
+def test_cuts_of_shorts_part_them_in_any_order(at: int, tmp_path: Path):
+    """The inseams are mirror images: which of them comes first makes no difference."""
+    result = _run(tmp_path, [*INSEAMS[:at], CENTRE, *INSEAMS[at:]])
     assert not any("a tube" in note for note in result.notes)
     assert set(result.metrics["pieces"]) == {"shorts.left", "shorts.right"}
     assert max(abs(seam["difference_mm"]) for seam in result.metrics["seams"]) < 0.1

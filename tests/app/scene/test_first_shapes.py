@@ -7,16 +7,12 @@ import pytest
 
 from warpflat.app.scene.first_shapes import PIECES, make_pieces
 from warpflat.core.errors import InputError
-
-
-def border_length(points: np.ndarray, closed: bool = False) -> float:
-    points = np.vstack([points, points[:1]]) if closed else points
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+from warpflat.core.polyline import polyline_length
 
 
 def test_gusset_reaches_around_three_sides_of_a_tote():
     front, back, gusset, *handles = make_pieces("tote", width=0.30, height=0.35, depth=0.08)
-    assert border_length(gusset.vertices[gusset.lines["centre"]]) == pytest.approx(2 * 0.35 + 0.30)
+    assert polyline_length(gusset.vertices[gusset.lines["centre"]]) == pytest.approx(2 * 0.35 + 0.30)
     assert [piece.name for piece in handles] == ["handle_front", "handle_back"]
     x, y = front.vertices[:, 0], front.vertices[:, 1]
     for point in front.vertices[(np.abs(np.abs(x) - 0.15) < 1e-9) | (y < 1e-9)]:
@@ -28,7 +24,7 @@ def test_hat_goes_around_the_head():
     pieces = {piece.name: piece for piece in make_pieces("sun_hat", head=0.55, brim=0.07)}
     assert set(pieces) == {"crown", "side_front", "side_back", "brim_front", "brim_back"}
     side = pieces["side_front"].vertices
-    half = border_length(side[np.abs(side[:, 1]) < 1e-9])
+    half = polyline_length(side[np.abs(side[:, 1]) < 1e-9])
     assert 2 * half == pytest.approx(0.57, rel=1e-3)
     assert pieces["brim_front"].vertices[:, 1].min() < -0.01
 

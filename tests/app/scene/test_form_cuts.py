@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import tomllib
 
 from warpflat.app.cli.main import main
 from warpflat.app.scene.form import scene_form
@@ -19,6 +18,7 @@ from warpflat.app.scene.plan import plan_form_scene
 from warpflat.app.scene.run import run_scene
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, polyline_length
+from warpflat.core.toml_file import tomllib
 from warpflat.garment.construction.garment_files import garment_files
 from warpflat.pattern.export.pattern_files import PatternOptions
 from warpflat.pattern.export.pattern_json import read_pattern_json
@@ -215,6 +215,15 @@ def test_the_command_makes_a_cut_of_a_form(tmp_path: Path, capsys: pytest.Captur
     best = json.loads((tmp_path / "out/ledger.json").read_text())["entries"][0]["cut"]
     assert tomllib.loads((tmp_path / "out/cuts.toml").read_text())["cuts"] == [best]
     assert "beyond the limit" in capsys.readouterr().out
+
+
+def test_an_edit_that_is_not_at_rest_is_told_as_a_run_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    (tmp_path / "b.toml").write_text(
+        'form = "bodice"\nshape = "darts"\nhalf = true\n[mannequin]\nsize = "EU 38"\nresolution_mm = 40\n[relax]\nmax_steps = 5\n'
+    )
+    turned = ("--turn", "front.waist dart", "nothing", "--out", str(tmp_path / "out"), "-q")
+    assert main(["cuts", str(tmp_path / "b.toml"), *turned]) == 1
+    assert "warpflat: front did not converge within " in capsys.readouterr().err
 
 
 def test_the_advice_of_a_run_can_be_pasted(tmp_path: Path):

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import tomllib
 
 from warpflat.app.scene.form import scene_form
 from warpflat.app.scene.load import Scene, load_scene, scene_fabric
 from warpflat.app.scene.plan import plan_form_scene
 from warpflat.app.scene.wardrobe import garment_offer, offer_tables, scene_text
 from warpflat.core.errors import InputError
+from warpflat.core.toml_file import tomllib
 from warpflat.garment.construction.girths import pattern_girths
 from warpflat.garment.construction.openings import opened_rings
 from warpflat.garment.construction.rings import GarmentRing, measure_rings

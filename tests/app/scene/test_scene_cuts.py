@@ -261,7 +261,6 @@ def test_auto_cut_leaves_a_piece_whole_where_there_is_nothing_to_cut_and_says_wh
     ("cuts", "message"),
     [
         ([{"line": "burst"}], r"trial.toml: cuts\[0\]: .*no line 'burst'.*did you mean 'bust'"),
-        ([{"line": "bottom"}], "runs along the border between vertices 0 and 1"),
         ([{"from": 40, "to": 40}], r"cuts\[0\]: .*vertex 40"),
         ([{"line": "bust"}, {"name": "b", "line": "bust"}], "is cut by two paths"),
     ],

@@ -5,9 +5,7 @@ be followed, and each printed word is German, too.
 from __future__ import annotations
 
 import json
-import os
 import re
-import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
@@ -16,6 +14,7 @@ from pathlib import Path
 import pytest
 from printed import drawn_faults
 from pypdf import PdfReader
+from real_files import DATA
 from usd_validation import validate_usd
 
 from warpflat.app.scene.load import Scene, load_scene, make_scene
@@ -24,7 +23,7 @@ from warpflat.app.scene.run import run_scene
 from warpflat.app.scene.wardrobe import garment_offer, offers, scene_text
 from warpflat.core.polyline import polyline_length
 from warpflat.core.text import other_side
-from warpflat.core.toml_file import read_toml
+from warpflat.core.toml_file import read_toml, tomllib
 from warpflat.flat.fabric.library import load_library
 from warpflat.garment.construction.linings import add_interfacing, add_lining
 from warpflat.garment.construction.to_pattern import pattern_of_garment
@@ -40,13 +39,7 @@ from warpflat.pattern.drafting.words import language_words, printed_in
 from warpflat.pattern.export.pattern_files import export_patterns
 from warpflat.pattern.export.pattern_json import read_pattern_json
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
 SCENES = Path(__file__).parents[3] / "scenes"
-DATA = os.environ.get("WARPFLAT_DATA")
 
 # Batch files name scenes; tests/app/batch loads them.
 SHIPPED = [path for path in sorted(SCENES.glob("*.toml")) if not {"scenes", "forms", "tasks"} & read_toml(path).keys()]
@@ -115,7 +108,7 @@ SHEET = re.compile(r"sheet [A-Z]+\d+  -  ")
 def test_every_shipped_scene_converges_unfolded(path: Path, tmp_path: Path):
     text = path.read_text()
     assert text.startswith("# ")
-    if "WARPFLAT_DATA" in text and not DATA:
+    if "WARPFLAT_DATA" in text and not DATA.is_dir():
         pytest.skip("WARPFLAT_DATA is not set: the folder with the real meshes")
     result = run_scene(made_light(load_scene(path)), tmp_path)
     for name, piece in result.metrics["pieces"].items():

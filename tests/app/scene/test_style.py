@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-
 import pytest
 
 from warpflat.app.scene.style import style_options
 from warpflat.app.scene.wardrobe import garment_offer, offer_tables, offers, scene_text
 from warpflat.core.errors import InputError
+from warpflat.core.toml_file import tomllib
 from warpflat.garment.mannequin.forms import form_from_mapping
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 
 def tables_of(name: str, **style: str) -> dict:

@@ -95,7 +95,7 @@ def test_pick_cut_cloth_undo_save(tmp_path: Path) -> None:
             assert " mm" in words
             assert page.session.scene.settings.cuts == []
             browser.press("Apply")
-            wait_for(lambda: page.session.can_undo)
+            wait_for(lambda: page.session.step.what != "scene")
             assert page.session.scene.settings.cuts[0].line == "bust"
             browser.choose("cloth", "denim")
             wait_for(lambda: page.session.scene.settings.fabric == "denim" and not page.session.activity)
@@ -155,9 +155,9 @@ def test_drag_a_dart_and_save(tmp_path: Path) -> None:
                 ends = [on_screen(client.camera, place, width, height) for place in (tip, tip + 0.05 * inwards)]
                 browser.drag(*ends)
                 with suppress(AssertionError):
-                    wait_for(lambda: page.session.can_undo and not page.session.activity, 8.0)
+                    wait_for(lambda: page.session.step.what != "scene" and not page.session.activity, 8.0)
                     break
-            assert page.session.can_undo == "trial: tip of bust"
+            assert page.session.step.what == "trial: tip of bust"
             (cut,) = page.session.scene.settings.cuts
             assert cut.part is not None
             assert cut.part[1] > 0.35
@@ -174,7 +174,7 @@ def test_drag_a_dart_and_save(tmp_path: Path) -> None:
             )
             assert pdf == "%PDF"
             browser.press("Undo")
-            wait_for(lambda: not page.session.can_undo)
+            wait_for(lambda: page.session.step.what == "scene")
             assert page.session.scene.settings.cuts[0].part == [0.0, 0.3]
             assert browser.faults == []
     finally:
@@ -239,7 +239,7 @@ def test_marks_vanish_with_undo_and_the_view_follows_the_size(tmp_path: Path) ->
         page.undo()  # the cut that was only tried
         wait_for(lambda: page.is_idle and page.session.preview is None)
         assert page._picked is None
-        assert page.session.can_undo == "size"
+        assert page.session.step.what == "size"
         # A measure is bounded in the unit that is shown.
         assert page._panel._measures["waist"].min > 10.0
         # On a narrow page form and pattern are shown above the panel.

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
@@ -10,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from real_files import DATA, needs_data
 
 import warpflat
 from warpflat.app.scene.auto_cut import AutoCutTable, cut_automatically
@@ -41,7 +41,6 @@ from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.flat.surface.shapes import make_shape
 from warpflat.pattern.export.piece_files import save_piece
 
-DATA = os.environ.get("WARPFLAT_DATA")
 N = 33
 FINE = RelaxOptions(residual_tolerance=1e-6, energy_tolerance=1e-12, max_steps=60_000)
 
@@ -121,9 +120,9 @@ def test_both_cuts_release_at_least_what_the_paper_reports_and_the_princess_line
         assert all(seam["opening_m"] > 0.05 for made in result.measures["cuts"] for seam in made["seams"])
 
 
-@pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: the folder with the real meshes")
+@needs_data
 def test_the_paper_cuts_on_a_real_body():
-    surface = read_surface(Path(str(DATA)) / "front_bodice_raw.obj", units="m")
+    surface = read_surface(DATA / "front_bodice_raw.obj", units="m")
     surface = with_lines(surface, {"centre front": line_on_plane(surface, [0, 0, 0], [1, 0, 0])})
     v = surface.vertices
     chest = (v[:, 1] > 1.10) & (v[:, 1] < 1.20)

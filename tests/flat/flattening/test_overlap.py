@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 from collections.abc import Callable
 from itertools import pairwise
@@ -15,6 +14,7 @@ import shapely
 from devices import DEVICE
 from numpy.typing import NDArray
 from obj_files import write_obj
+from real_files import DATA, needs_data
 from surface_meshes import quads_between
 
 from warpflat.app.cli.main import main
@@ -35,8 +35,6 @@ from warpflat.garment.construction.to_pattern import pattern_of_surface
 
 FloatArray = NDArray[np.float64]
 Place = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
-DATA = os.environ.get("WARPFLAT_DATA")
-needs_data = pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: the folder with the real meshes")
 
 
 def band(place: Place, *, along: int = 41, across: int = 7) -> Surface:
@@ -158,7 +156,7 @@ def test_a_ring_that_contact_hardly_strains_is_not_swirled(monkeypatch: pytest.M
 
 @needs_data
 def test_a_pattern_is_drawn_of_the_trouser_front():
-    surface = read_surface(Path(DATA or "") / "trouser_front.obj", units="m")
+    surface = read_surface(DATA / "trouser_front.obj", units="m")
     parted = flatten(surface, device=DEVICE)
     assert broken_by_contact(parted) == []
     (area,) = (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,12 +10,14 @@ import numpy as np
 import pytest
 from devices import DEVICE
 from numpy.typing import NDArray
+from real_files import needs_data
 from surface_meshes import quads_between
 
 import warpflat
 from warpflat.app.scene.load import load_scene
 from warpflat.app.scene.surface import scene_surface
 from warpflat.core.errors import InputError
+from warpflat.core.vectors import laid_upon
 from warpflat.flat.fabric.fabric import Fabric
 from warpflat.flat.fabric.library import find_fabric
 from warpflat.flat.model.network import SpringNetwork
@@ -29,8 +30,6 @@ from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.flat.surface.shapes import make_shape
 from warpflat.pattern.export.piece_files import save_piece
 
-DATA = os.environ.get("WARPFLAT_DATA")
-needs_data = pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: the folder with the real meshes")
 SCENES = Path(__file__).parents[3] / "scenes"
 
 
@@ -47,9 +46,7 @@ def membrane(shape: warpflat.Surface, fabric: Fabric | str, **options: object) -
 
 def apart(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     """Distances [m] once b is laid upon a."""
-    u, _, v = np.linalg.svd((b - b.mean(0)).T @ (a - a.mean(0)))
-    turn = u @ np.diag([1.0, np.sign(np.linalg.det(u @ v))]) @ v
-    return np.linalg.norm((b - b.mean(0)) @ turn + a.mean(0) - a, axis=1)
+    return np.linalg.norm(laid_upon(a, b) - a, axis=1)
 
 
 @pytest.mark.parametrize("fabric", [soft(5.0), soft(50.0), "denim", "interlock", "isotropic"], ids=str)

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 from cut_meshes import broken_by_split, cylinder, dome, flat, glue, grid, surface
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from real_files import DATA, needs_data
 
 from warpflat.core.errors import InputError
 from warpflat.flat.surface.cut.cut_mesh import cut_along
 from warpflat.flat.surface.cut.split_faces import split_faces_along
 from warpflat.flat.surface.half_edges import border_edges
 from warpflat.flat.surface.paths.trace import VertexStar, geodesic_path, locate, path_triangles, polyline_path
-
-DATA = os.environ.get("WARPFLAT_DATA")
 
 
 def smallest_angles(mesh):
@@ -202,9 +198,9 @@ def test_random_paths_on_random_surfaces(seed, columns, rows, snap):
         np.testing.assert_array_equal(glue(cut), result.surface.faces)
 
 
-@pytest.mark.skipif(DATA is None, reason="set WARPFLAT_DATA to the folder with front_bodice_raw.obj")
+@needs_data
 def test_a_scan_with_slivers():
-    rows = [line.split() for line in (Path(DATA) / "front_bodice_raw.obj").read_text().splitlines()]
+    rows = [line.split() for line in (DATA / "front_bodice_raw.obj").read_text().splitlines()]
     vertices = np.array([[float(x) for x in row[1:4]] for row in rows if row and row[0] == "v"])
     faces = np.array([[int(x.split("/")[0]) - 1 for x in row[1:4]] + [-1] for row in rows if row and row[0] == "f"])
     mesh = surface(vertices, faces)

@@ -1,10 +1,8 @@
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
+from real_files import DATA, needs_data
 from surface_meshes import cylinder, grid, plane, scattered, sphere
 
 from warpflat.core.errors import InputError
@@ -13,9 +11,6 @@ from warpflat.flat.surface.paths.geodesic import distance_from, extend_to_border
 from warpflat.flat.surface.paths.lines import line_on_plane
 from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.flat.surface.triangles import triangulate
-
-DATA = os.environ.get("WARPFLAT_DATA")
-needs_data = pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: no real meshes")
 
 
 def mirrored(surface, x, y):
@@ -154,7 +149,7 @@ def test_closed_or_empty_line_is_no_datum():
 @needs_data
 @pytest.mark.parametrize(("name", "most"), [("garment_shirtfront", 0.001), ("front_bodice_raw", 0.003)])
 def test_first_layout_of_real_pieces_is_nearly_free_of_folds(name, most):
-    surface = read_surface(Path(DATA or "") / f"{name}.obj", units="m")
+    surface = read_surface(DATA / f"{name}.obj", units="m")
     centre = surface.vertices.mean(axis=0)
     line = line_on_plane(surface, centre, [1, 0, 0])
     x, y = signed_distance_and_station(surface, line)

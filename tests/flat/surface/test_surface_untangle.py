@@ -1,11 +1,10 @@
 from __future__ import annotations
 
-import os
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from real_files import DATA, needs_data
 from surface_meshes import cylinder, grid, plane, scattered
 
 from warpflat.flat.surface.io.read import read_surface
@@ -14,9 +13,6 @@ from warpflat.flat.surface.paths.lines import line_on_plane
 from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.flat.surface.triangles import triangulate
 from warpflat.flat.surface.untangle import untangle
-
-DATA = os.environ.get("WARPFLAT_DATA")
-needs_data = pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: no real meshes")
 
 
 def areas(surface, flat):
@@ -78,7 +74,7 @@ def test_layout_folded_at_large_is_given_up_with_the_count():
 @needs_data
 @pytest.mark.parametrize("name", ["front_bodice_raw", "garment_shirtfront"])
 def test_first_layout_of_real_pieces_comes_free_of_folds(name):
-    surface = read_surface(Path(DATA or "") / f"{name}.obj", units="m")
+    surface = read_surface(DATA / f"{name}.obj", units="m")
     line = line_on_plane(surface, surface.vertices.mean(axis=0), [1, 0, 0])
     out, left = untangle(surface, np.stack(signed_distance_and_station(surface, line), axis=1))
     assert left == 0

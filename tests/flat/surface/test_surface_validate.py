@@ -1,12 +1,10 @@
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from real_files import DATA, needs_data
 from surface_meshes import broken_invariants, cylinder, grid, scattered
 
 from warpflat.core.errors import InputError
@@ -17,9 +15,6 @@ from warpflat.flat.surface.repair.polygons import _quad_corners, find_crossed_qu
 from warpflat.flat.surface.repair.slivers import degenerate_faces
 from warpflat.flat.surface.repair.validate import make_surface
 from warpflat.flat.surface.triangles import triangulate
-
-DATA = os.environ.get("WARPFLAT_DATA")
-needs_data = pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: no real meshes")
 
 
 def area(surface):
@@ -456,7 +451,7 @@ def test_random_slivers_are_merged_without_losing_area_or_border(seed, count):
 
 @needs_data
 def test_slivers_of_the_real_bodice_are_merged_by_name():
-    surface = read_surface(Path(DATA or "") / "front_bodice_raw.obj", units="m")
+    surface = read_surface(DATA / "front_bodice_raw.obj", units="m")
     assert broken_invariants(surface) == []
     assert len(surface.input_vertices) == 7736
     assert 7725 <= len(surface.vertices) < 7736
@@ -470,19 +465,19 @@ def test_slivers_of_the_real_bodice_are_merged_by_name():
 
 
 def _raw_faces():
-    text = (Path(DATA or "") / "front_bodice_raw.obj").read_text().splitlines()
+    text = (DATA / "front_bodice_raw.obj").read_text().splitlines()
     return np.array([[int(word.split("/")[0]) - 1 for word in row.split()[1:]] for row in text if row[:2] == "f "])
 
 
 def _raw_area():
-    text = (Path(DATA or "") / "front_bodice_raw.obj").read_text().splitlines()
+    text = (DATA / "front_bodice_raw.obj").read_text().splitlines()
     p = np.array([[float(word) for word in row.split()[1:4]] for row in text if row[:2] == "v "])[_raw_faces()]
     return np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1).sum() / 2
 
 
 @needs_data
 def test_real_shirt_front_has_its_welded_vertices():
-    surface = read_surface(Path(DATA or "") / "garment_shirtfront.obj", units="m")
+    surface = read_surface(DATA / "garment_shirtfront.obj", units="m")
     assert broken_invariants(surface) == []
     assert surface.vertices.shape == (3743, 3)
     assert len(surface.faces) == 7177

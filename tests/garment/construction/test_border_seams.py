@@ -12,6 +12,7 @@ from scipy.spatial import Delaunay
 from warpflat.app.scene.load import make_scene
 from warpflat.app.scene.run import run_scene
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import polyline_length
 from warpflat.flat.flattening.flatten_piece import flatten
 from warpflat.flat.flattening.result import Flattening
 from warpflat.flat.solver.options import RelaxOptions
@@ -55,8 +56,7 @@ def sleeve(turn: float = 2 * np.pi, counts: tuple[int, int] = (13, 20)) -> Surfa
 
 
 def lengths(result: Flattening, line: str) -> float:
-    points = result.positions[result.network.surface.lines[line]]
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    return polyline_length(result.positions[result.network.surface.lines[line]])
 
 
 @pytest.fixture(scope="module")

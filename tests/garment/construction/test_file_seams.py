@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ import numpy as np
 import obj_files
 import pytest
 import trimesh
+from real_files import DATA, needs_data
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from surface_meshes import quads_between
@@ -312,9 +312,9 @@ def test_seams_are_the_edges_between_islands(tmp_path: Path) -> None:
     assert all(abs(b - a) == AROUND for a, b in seams.edges.tolist())
 
 
-@pytest.mark.skipif(not os.environ.get("WARPFLAT_DATA"), reason="WARPFLAT_DATA is not set: no real meshes")
+@needs_data
 def test_a_suit_is_cut_where_its_maker_unwrapped_it() -> None:
-    path = Path(os.environ["WARPFLAT_DATA"]) / "garments" / "male_casualsuit04.obj"
+    path = DATA / "garments" / "male_casualsuit04.obj"
     # Cut from a sheet that no direction spares, its islands would be a tenth beyond the limit, and are no pattern.
     tables = {"surface": {"file": str(path), "units": "dm"}, "fabric": "woven"}
     result = found_seams(make_scene(tables, name="suit", folder=path.parent, where="here"))
@@ -328,9 +328,9 @@ def test_a_suit_is_cut_where_its_maker_unwrapped_it() -> None:
     assert whole - area == pytest.approx(0.0087, abs=2e-4)
 
 
-@pytest.mark.skipif(not os.environ.get("WARPFLAT_DATA"), reason="WARPFLAT_DATA is not set: no real meshes")
+@needs_data
 def test_a_narrow_strip_along_the_waist_is_a_waistband() -> None:
-    path = Path(os.environ["WARPFLAT_DATA"]) / "garments" / "Women_Skirt.usd"
+    path = DATA / "garments" / "Women_Skirt.usd"
     result = found_seams(make_scene({"surface": {"file": str(path)}}, name="skirt", folder=path.parent, where="here"))
     assert result is not None
     assert {piece.name for piece in result.pieces} == {"front", "back", "front_waistband", "back_waistband"}

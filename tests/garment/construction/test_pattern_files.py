@@ -532,23 +532,6 @@ def test_another_size_that_went_wrong_is_a_warning(
     assert sizes["EU 36"]["sewing"]["converged"]
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("{", "is no JSON"),
-        ("[]", "no pattern of warpflat"),
-        ('{"sizes": {}, "schema": 99}', "has schema 99"),
-        ('{"sizes": {}, "schema": 1}', "name: is missing"),
-    ],
-)
-def test_a_broken_file_is_one_line(text: str, said: str, tmp_path: Path):
-    (tmp_path / "pattern.json").write_text(text)
-    with pytest.raises(InputError, match=said) as caught:
-        export_patterns(tmp_path, ["svg"])
-    assert "pattern.json" in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
 def test_a_size_of_a_pattern_without_sizes_is_told(tmp_path: Path):
     drafted = drafted_alone(polygon("plain", corners_of(0.3, 0.3)))
     (tmp_path / "pattern.json").write_text(json.dumps(pattern_json(drafted)))

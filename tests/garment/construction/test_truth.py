@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from real_files import DATA, needs_data
 from surface_meshes import quads_between
 
 from warpflat.core.errors import InputError
@@ -19,8 +19,6 @@ from warpflat.garment.construction.sewn_panels import SewnPanel, sewn_panels
 sys.path.insert(0, str(Path(__file__).parents[3] / "benchmarks"))
 
 import truth
-
-_DATA = os.environ.get("WARPFLAT_DATA")
 
 
 def _rolled(unit: float) -> RawMesh:
@@ -75,9 +73,9 @@ def test_a_texture_that_is_no_pattern_is_refused():
         sewn_panels(raw, 1.0)
 
 
-@pytest.mark.skipif(_DATA is None, reason="WARPFLAT_DATA is not set: Female_T_Shirt.usd")
+@needs_data
 def test_a_worn_sleeve_lies_on_its_panel():
-    file = Path(str(_DATA)) / "garments" / "Female_T_Shirt.usd"
+    file = DATA / "garments" / "Female_T_Shirt.usd"
     _, raw, scale, _ = read_mesh_file(file, units=None, prim=None, name=None)
     panels = sewn_panels(raw, scale)
     assert [truth.is_band(panel) for panel in panels] == [False, False, False, False, True]

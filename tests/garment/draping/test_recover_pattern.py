@@ -11,6 +11,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 import warpflat
 from warpflat.core.errors import InputError
+from warpflat.core.vectors import laid_upon
 from warpflat.garment.draping.options import DrapeOptions
 from warpflat.garment.draping.recover_pattern import recover_cloth
 from warpflat.garment.draping.relax_drape import relax_drape
@@ -30,9 +31,7 @@ def hung(n: int, shape: RegularGridInterpolator | None = None) -> tuple[SewnClot
 
 def apart(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Distances after the best rigid motion."""
-    p, q = p - p.mean(axis=0), q - q.mean(axis=0)
-    u, _, v = np.linalg.svd(p.T @ q)
-    return np.asarray(np.linalg.norm(p @ (u @ v) - q, axis=1))
+    return np.linalg.norm(laid_upon(q, p) - q, axis=1)
 
 
 def test_a_sheet_draped_on_one_mesh_is_recovered_on_another():

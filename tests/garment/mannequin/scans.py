@@ -3,31 +3,25 @@
 from __future__ import annotations
 
 import functools
-import os
-from pathlib import Path
 from unittest import mock
 
 import numpy as np
-import pytest
 import trimesh
 from bodies import had_by_all
 from body_copies import copy_of_body
 from body_tapes import armpit_and_crotch
+from real_files import DATA
 
 from warpflat.flat.surface.io.read import read_scan
 from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.read_body import ReadBody, read_body
 from warpflat.garment.mannequin.scan_pose import ScanOptions
 
-needs_bodies = pytest.mark.skipif(
-    "WARPFLAT_DATA" not in os.environ, reason="body scans: set WARPFLAT_DATA to their folder"
-)
-
 
 @functools.cache
 def scan(name: str) -> tuple[np.ndarray, np.ndarray]:
     """Vertices #V by 3 [m], feet at y = 0, and faces #F by 4 (-1 in the last column for a triangle)."""
-    points, faces = read_scan(Path(os.environ["WARPFLAT_DATA"]) / f"body_{name}.obj")
+    points, faces = read_scan(DATA / f"body_{name}.obj")
     points = np.asarray(points, float)
     return points - [0.0, points[:, 1].min(), 0.0], np.asarray(faces)
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from armhole_curves import corner_degrees, depth_inside, inflections, sharpest_turn
 from bodies import stood
-from scans import needs_bodies, scan, scanned_body
+from real_files import needs_data
+from scans import scan, scanned_body
 
 from warpflat.core.polyline import polyline_length
 from warpflat.garment.construction.form_garment import flatten_form
@@ -17,7 +18,7 @@ from warpflat.garment.mannequin.mannequin import Mannequin
 from warpflat.garment.mannequin.outside import BodySurface, push_outside
 from warpflat.garment.mannequin.scan_pose import ScanOptions, turn_scan_upright
 
-BODIES = ["child", pytest.param("scan child", marks=needs_bodies)]
+BODIES = ["child", pytest.param("scan child", marks=needs_data)]
 
 
 @functools.cache
@@ -55,7 +56,7 @@ def test_armholes_have_no_horns_and_sleeves_can_be_sewn(name: str) -> None:
         assert all(65.0 < corner < 120.0 for corner in corners), corners
 
 
-@needs_bodies
+@needs_data
 @pytest.mark.parametrize("name", ["female", "male_heavy"])
 def test_scanned_armholes_end_below_the_armpit(name: str) -> None:
     slicer, _ = turn_scan_upright(*scan(name), ScanOptions())
@@ -73,7 +74,7 @@ def test_scanned_armholes_end_below_the_armpit(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "form"), [("child", "trousers"), pytest.param("scan child", "dress", marks=needs_bodies)]
+    ("name", "form"), [("child", "trousers"), pytest.param("scan child", "dress", marks=needs_data)]
 )
 def test_forms_stay_outside_the_body(name: str, form: str) -> None:
     body = _body(name)
@@ -98,7 +99,7 @@ def test_a_dent_is_pushed_out_smoothly_and_negative_ease_is_not() -> None:
     assert depth_inside(tight, body) > 0.003
 
 
-@needs_bodies
+@needs_data
 @pytest.mark.parametrize("name", ["female", "male_heavy"])
 def test_a_t_shirt_on_a_scan_has_no_hook_under_the_arm_and_a_round_neck(name: str) -> None:
     body = scanned_body(name, 15.0)

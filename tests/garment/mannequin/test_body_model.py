@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import trimesh
 from body_tapes import armpit_and_crotch
-from scans import needs_bodies, posed_body, scan, scanned_body, triangles_of
+from real_files import needs_data
+from scans import posed_body, scan, scanned_body, triangles_of
 
 from warpflat.core.errors import InputError
 from warpflat.garment.mannequin.body_landmarks import PLACES, height_weights
@@ -90,7 +91,7 @@ def _height(laid: StandingBody, landmark: str) -> float:
     return float(height_weights(landmark) @ BodyModel.load().vertices(laid.fit.person)[:, 1])
 
 
-@needs_bodies
+@needs_data
 def test_the_fit_follows_a_landmark_that_is_given() -> None:
     points, faces = scan("female")
     points, triangles = points - [0.0, points[:, 1].min(), 0.0], triangles_of(faces)
@@ -109,7 +110,7 @@ def test_the_fit_follows_a_landmark_that_is_given() -> None:
     assert _height(crotch, "hip") < _height(free, "hip") - 0.008
 
 
-@needs_bodies
+@needs_data
 def test_a_scan_is_measured_at_the_landmarks_that_are_given() -> None:
     points, faces = scan("female")
     free = scanned_body("female")
@@ -131,7 +132,7 @@ def test_a_scan_is_measured_at_the_landmarks_that_are_given() -> None:
     assert set(LANDMARKS) - set(PLACES) == {"thigh", "abdomen"}
 
 
-@needs_bodies
+@needs_data
 @pytest.mark.parametrize(
     ("name", "wanted"),
     [
@@ -151,7 +152,7 @@ def _without(which: Callable[[np.ndarray], np.ndarray], points: np.ndarray, face
     return faces[~which(points[faces[:, :3]].mean(axis=1))]
 
 
-@needs_bodies
+@needs_data
 @pytest.mark.parametrize("case", ["arms cut off above and below on a floor", "legs apart", "legs crossed", "T-pose"])
 def test_scans_that_show_less_or_more_than_a_standing_body(case: str) -> None:
     points, faces = scan("female")
@@ -187,7 +188,7 @@ def test_scans_that_show_less_or_more_than_a_standing_body(case: str) -> None:
         assert body.measures[tape].girth == pytest.approx(girth, abs=0.012), tape
 
 
-@needs_bodies
+@needs_data
 def test_sleeves_of_a_t_pose_hang_from_the_shoulders() -> None:
     body = posed_body("female", "arms up")
     assert any("its arms are raised by" in note for note in body.notes)
@@ -197,7 +198,7 @@ def test_sleeves_of_a_t_pose_hang_from_the_shoulders() -> None:
     assert hand[:, 1].mean() < 0.72 * tall
 
 
-@needs_bodies
+@needs_data
 def test_one_arm_is_refused_in_one_line() -> None:
     points, faces = scan("female")
     faces = _without(lambda at: (at[:, 0] > 0.2) & (at[:, 1] > 0.5 * points[:, 1].max()), points, faces)

@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from scans import needs_bodies, scan, triangles_of
+from real_files import needs_data
+from scans import scan, triangles_of
 
 from warpflat.app.scene.found_seams import waist_of_body
 
 
-@needs_bodies
+@needs_data
 def test_the_waist_of_a_body_is_a_place_in_its_own_file(tmp_path: Path) -> None:
     vertices, faces = scan("female")
     # In its file it has Z up, is in centimetres, and stands away from the origin.

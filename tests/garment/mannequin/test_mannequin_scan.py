@@ -15,7 +15,8 @@ from body_tapes import armpit_and_crotch, tapes
 from landmarks import Landmarks
 from limb_tapes import arm_tapes, head_tape, leg_tapes
 from obj_files import write_obj
-from scans import needs_bodies, posed_body, posed_scan, scan, scanned_body, triangles_of
+from real_files import needs_data
+from scans import posed_body, posed_scan, scan, scanned_body, triangles_of
 from scipy.spatial import ConvexHull, cKDTree
 from self_intersections import self_intersections
 
@@ -42,7 +43,7 @@ def on_scan(points: np.ndarray, faces: np.ndarray, resolution_mm: float = 20.0, 
     return Mannequin.from_scan(points, faces, options=ScanOptions(**options), resolution_mm=resolution_mm)
 
 
-@needs_bodies
+@needs_data
 @pytest.mark.parametrize("sex", list(KNOWN))
 def test_levels_are_where_the_body_has_them(sex: str) -> None:
     body = scanned_body(sex)
@@ -60,7 +61,7 @@ def test_levels_are_where_the_body_has_them(sex: str) -> None:
     assert np.abs(body.vertices[:, 0]).max() < 0.75 * body.vertices[:, 1].max()
 
 
-@needs_bodies
+@needs_data
 @pytest.mark.parametrize(
     ("kind", "sex"),  # all by benchmarks/scan_tapes.py
     [*(("plain", sex) for sex in KNOWN), ("noisy", "male")],
@@ -86,7 +87,7 @@ def test_levels_agree_with_tapes_laid_without_the_package(kind: str, sex: str) -
     assert len(self_intersections(body.vertices, body.layout.body_faces)) == 0
 
 
-@needs_bodies
+@needs_data
 @pytest.mark.parametrize(("sex", "pose"), [("female", "arms level"), ("male_heavy", "arms down")])
 def test_a_bust_is_one_whatever_the_arms_do(sex: str, pose: str) -> None:
     plain, posed = scanned_body(sex).measures, posed_body(sex, pose).measures
@@ -96,7 +97,7 @@ def test_a_bust_is_one_whatever_the_arms_do(sex: str, pose: str) -> None:
         assert (posed[name].guess is None) == (plain[name].guess is None), name
 
 
-@needs_bodies
+@needs_data
 def test_the_fullest_chest_is_a_tape_of_its_own() -> None:
     for sex in KNOWN:
         points, faces = scan(sex)
@@ -110,7 +111,7 @@ def test_the_fullest_chest_is_a_tape_of_its_own() -> None:
         assert abs(chest.girth - girth) < 0.015, sex
 
 
-@needs_bodies
+@needs_data
 def test_fit_has_the_levels_of_the_mannequin() -> None:
     for name in ("male", "gc_mean_female"):
         points, faces = scan(name)
@@ -129,7 +130,7 @@ def _arms(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return np.asarray(np.abs(points[faces[:, :3], 0]).mean(axis=1) > 0.24)
 
 
-@needs_bodies
+@needs_data
 def test_a_body_with_forty_holes_and_parts_wound_inward_is_measured_as_the_whole_one() -> None:
     """Both arms are turned: the left is a part of its own, a seam's width off the trunk, the right hangs together with it."""
     points, whole = scan("male")
@@ -150,7 +151,7 @@ def test_a_body_with_forty_holes_and_parts_wound_inward_is_measured_as_the_whole
             assert abs(body.measures[name].girth - tape.girth) < (0.004 if name.startswith("biceps") else 0.009), name
 
 
-@needs_bodies
+@needs_data
 @pytest.mark.parametrize("sex", ["female", "male"])
 def test_mannequin_lies_on_the_scan(sex: str) -> None:
     points, faces = scan(sex)
@@ -221,7 +222,7 @@ def noisy_body(sex: str) -> Mannequin:
 OTHERS = {"female": ("stooped",), "male": ("belly", "slim", "tall")}
 
 
-@needs_bodies
+@needs_data
 @pytest.mark.parametrize(("sex", "kind"), [(sex, kind) for sex, kinds in OTHERS.items() for kind in kinds])
 def test_other_bodies(sex: str, kind: str) -> None:
     points, faces = scan(sex)
@@ -242,7 +243,7 @@ def test_other_bodies(sex: str, kind: str) -> None:
     assert len(self_intersections(body.vertices, body.layout.body_faces)) == 0
 
 
-@needs_bodies
+@needs_data
 def test_units_and_poses_are_recognised() -> None:
     points, faces = scan("female")
     upright = cKDTree(turn_scan_upright(points, faces, ScanOptions())[0].vertices)
@@ -262,7 +263,7 @@ def test_units_and_poses_are_recognised() -> None:
         assert away.mean() < 0.0001, name
 
 
-@needs_bodies
+@needs_data
 def test_a_body_without_hands_and_feet_is_measured_above_and_says_so() -> None:
     points, faces = scan("female")
     low = points[faces[:, :3], 1].min(axis=1)
@@ -281,7 +282,7 @@ def test_a_body_without_hands_and_feet_is_measured_above_and_says_so() -> None:
     assert body.measures["ankle left"].guess is not None
 
 
-@needs_bodies
+@needs_data
 def test_left_and_right_are_averaged_or_kept() -> None:
     points, faces = scan("female")
     lopsided = points + np.outer(
@@ -298,7 +299,7 @@ def test_left_and_right_are_averaged_or_kept() -> None:
     assert not any("left and right differ" in note for note in scanned_body("female").notes)
 
 
-@needs_bodies
+@needs_data
 @pytest.mark.parametrize(
     ("options", "factor", "words"),
     [
@@ -373,7 +374,7 @@ def test_scan_with_a_vertex_far_off_names_it(tmp_path: Path) -> None:
         mannequin_from_scan_file(tmp_path / "none.obj", options=ScanOptions(), resolution_mm=20.0)
 
 
-@needs_bodies
+@needs_data
 def test_limbs_agree_with_tapes_laid_without_the_package_with_arms_level() -> None:
     points, faces = scan("female")
     posed, body = posed_scan("female", "arms level"), posed_body("female", "arms level")
@@ -396,7 +397,7 @@ def test_limbs_agree_with_tapes_laid_without_the_package_with_arms_level() -> No
     assert next(row for row in text.splitlines() if row.startswith("calf left")).endswith("cm")
 
 
-@needs_bodies
+@needs_data
 def test_distances_to_the_scan_are_small_and_drawn(tmp_path: Path) -> None:
     from warpflat.garment.mannequin.picture import signed_distances, write_distance_picture
 
@@ -408,7 +409,7 @@ def test_distances_to_the_scan_are_small_and_drawn(tmp_path: Path) -> None:
     assert (tmp_path / "distances.png").stat().st_size > 20_000
 
 
-@needs_bodies
+@needs_data
 def test_a_trunk_that_is_no_body_is_refused_with_its_place() -> None:
     points, faces = scan("male")
     share = points[:, 1] / points[:, 1].max()
@@ -428,7 +429,7 @@ def test_a_trunk_that_is_no_body_is_refused_with_its_place() -> None:
         on_scan(thin, faces, facing="+z")
 
 
-@needs_bodies
+@needs_data
 def test_a_trunk_that_is_narrowest_under_the_bust_has_a_guessed_waist_below() -> None:
     points, faces = scan("female")
     # The trunk grows broader from right below the underbust at 1.11 m down.
@@ -442,7 +443,7 @@ def test_a_trunk_that_is_narrowest_under_the_bust_has_a_guessed_waist_below() ->
     assert levels["underbust"].height - levels["waist"].height > 0.02 * body.vertices[:, 1].max()
 
 
-@needs_bodies
+@needs_data
 def test_a_scan_is_compared_with_the_nearest_size() -> None:
     body = scanned_body("female")
     told = body.metrics()
@@ -462,7 +463,7 @@ def test_a_scan_is_compared_with_the_nearest_size() -> None:
     assert f"{100 * told['levels']['hip']['girth_over_size_m']:+.1f} cm" in row
 
 
-@needs_bodies
+@needs_data
 @pytest.mark.parametrize(
     ("form", "sex"), [("basic_block", "child"), ("a_line_skirt", "male_heavy"), ("trousers", "male_heavy")]
 )
@@ -471,7 +472,7 @@ def test_skirts_and_trousers_hang_outside_the_body(form: str, sex: str) -> None:
     assert depth_inside(body.form(form), body) < 1e-4
 
 
-@needs_bodies
+@needs_data
 def test_one_foot_ahead_does_not_turn_the_trunk_and_a_crotch_that_is_not_shown_is_no_refusal() -> None:
     points, faces = scan("female")
     ahead = points.copy()
@@ -484,7 +485,7 @@ def test_one_foot_ahead_does_not_turn_the_trunk_and_a_crotch_that_is_not_shown_i
     assert body.measures["hip"].girth == pytest.approx(plain.measures["hip"].girth, abs=0.004)
 
 
-@needs_bodies
+@needs_data
 def test_a_childs_head_may_be_broader_than_its_waist_and_a_belly_is_no_bust() -> None:
     points, faces = scan("child")
     slim = points.copy()
@@ -503,7 +504,7 @@ def test_a_childs_head_may_be_broader_than_its_waist_and_a_belly_is_no_bust() ->
     assert abs(bust.girth - scanned_body("male_heavy").measures["bust"].girth) < 0.02
 
 
-@needs_bodies
+@needs_data
 def test_tapes_that_noise_moves_say_that_they_are_guesses() -> None:
     noisy, plain = noisy_body("male"), scanned_body("male")
     off = {
@@ -529,7 +530,7 @@ def _elbow_degrees(body: Mannequin) -> float:
     return float(np.degrees(np.arccos(upper @ lower / (np.linalg.norm(upper) * np.linalg.norm(lower)))))
 
 
-@needs_bodies
+@needs_data
 def test_bent_elbows_hang_and_a_kept_pose_stays_bent() -> None:
     hanging, kept = scanned_body("female"), on_scan(*scan("female"), keep_pose=True)
     assert _elbow_degrees(hanging) < 12.0

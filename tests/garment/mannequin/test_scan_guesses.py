@@ -8,7 +8,8 @@ import trimesh
 from body_tapes import armpit_and_crotch
 from landmarks import Landmarks
 from limb_tapes import arm_tapes, tape_across
-from scans import needs_bodies, posed_body, posed_scan, scan, scanned_body, triangles_of
+from real_files import needs_data
+from scans import posed_body, posed_scan, scan, scanned_body, triangles_of
 
 from warpflat.core.errors import InputError
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation
@@ -23,13 +24,13 @@ def _between(points: np.ndarray, faces: np.ndarray, low: float, high: float) -> 
     return points, faces[(share.min(axis=1) > low) & (share.max(axis=1) < high)]
 
 
-@needs_bodies
+@needs_data
 def test_a_body_without_its_head_is_refused() -> None:
     with pytest.raises(InputError, match="the head is missing"):
         Mannequin.from_scan(*_between(*scan("male"), 0.0, 0.89), resolution_mm=40.0)
 
 
-@needs_bodies
+@needs_data
 def test_the_fullest_place_of_an_evenly_full_arm_is_a_guess() -> None:
     faces = scan("male_heavy")[1]
     landmarks = Landmarks(faces)
@@ -48,7 +49,7 @@ def test_the_fullest_place_of_an_evenly_full_arm_is_a_guess() -> None:
     assert not any("elbow" in name and m.guess for name, m in scanned_body("female").measures.items())
 
 
-@needs_bodies
+@needs_data
 def test_fold_and_knee_of_a_mixed_body_are_right_or_guesses() -> None:
     """On bodies with one mesh a landmark's vertices on one are the landmark's on all, mixes among them."""
     (one, faces), (other, _) = scan("child"), scan("male_heavy")
@@ -62,7 +63,7 @@ def test_fold_and_knee_of_a_mixed_body_are_right_or_guesses() -> None:
     assert abs(knee.height - marks.knee(points, "left")) < 0.004 or knee.guess is not None
 
 
-@needs_bodies
+@needs_data
 def test_the_upper_arm_is_measured_from_where_the_arm_joins_the_trunk() -> None:
     """The scan shows where; measured from the body's nearest vertex, this mix's tapes lie 3.8 mm off."""
     (woman, faces), (child, _) = scan("female"), scan("child")
@@ -98,7 +99,7 @@ def test_trunk_of_two_equal_parts_has_a_direction() -> None:
     assert np.linalg.norm(left) == pytest.approx(1.0)
 
 
-@needs_bodies
+@needs_data
 def test_tapes_of_arms_above_the_shoulders_are_guesses() -> None:
     """The shoulder's flesh comes into them: a tape laid on the mesh is 60 to 110 mm off."""
     up, level = posed_body("female", "arms up"), posed_body("female", "arms level")

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 from cut_meshes import broken_by_split, cylinder, dome, flat, grid, surface
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from real_files import DATA, needs_data
 from scipy.spatial.transform import Rotation
 
 from warpflat.core.errors import InputError
@@ -19,8 +17,6 @@ from warpflat.flat.surface.half_edges import border_edges
 from warpflat.flat.surface.io.read import read_surface
 from warpflat.flat.surface.paths.trace import locate
 from warpflat.garment.seams.section import plane_path, plane_section, plane_sections
-
-DATA = os.environ.get("WARPFLAT_DATA")
 
 
 def test_plane_section_of_a_dome_lies_in_its_plane_and_reaches_the_border():
@@ -123,9 +119,9 @@ def test_random_planes_split_random_surfaces(seed, columns, rows, snap):
     assert broken_by_split(mesh, split_faces_along(mesh, path, snap=snap)) == []
 
 
-@pytest.mark.skipif(DATA is None, reason="set WARPFLAT_DATA to the folder with front_bodice_raw.obj")
+@needs_data
 def test_a_plane_splits_a_scan_with_slivers():
-    mesh = read_surface(Path(str(DATA)) / "front_bodice_raw.obj", units="m")
+    mesh = read_surface(DATA / "front_bodice_raw.obj", units="m")
     centre = mesh.vertices.mean(axis=0) + np.array([0.0, 0.0, 0.2])
     result = split_faces_along(mesh, plane_path(mesh, centre, [0.0, 1.0, 0.0]))
     assert broken_by_split(mesh, result) == []

@@ -1,12 +1,19 @@
 """Faired lines: without wobble, within their bound, straight where they are to be."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from warpflat.core.polyline import turning_angles
-from warpflat.pattern.drafting.fairing import bend_one_way, count_inflections, fair_line, fairest_line
+from warpflat.pattern.drafting.fairing import FairLine, bend_one_way, count_inflections, fair_lines, fairest_line
 
 ALONG = np.linspace(0.0, 0.3, 61)
+
+
+def fair_line(points: np.ndarray, wave: float, **options: Any) -> FairLine:
+    """Return a line that is faired by one wave."""
+    return next(fair_lines(points, [wave], **options))
 
 
 def wobbly_hip() -> np.ndarray:

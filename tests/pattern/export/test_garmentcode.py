@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import json
-import os
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command import Command
+from real_files import DATA, needs_data
 
 import warpflat
 from warpflat.core.errors import InputError
@@ -27,9 +27,6 @@ from warpflat.pattern.export.garmentcode import garmentcode_json, write_garmentc
 from warpflat.pattern.export.pattern_json import write_pattern_json
 from warpflat.pattern.export.read_garmentcode import garmentcode_pattern
 from warpflat.pattern.export.read_pattern import read_drafted, read_pattern
-
-DATA = os.environ.get("WARPFLAT_DATA")
-needs_data = pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: no patterns of GarmentCode")
 
 
 def panel(vertices: list[tuple[float, float]], curves: dict[int, Any] | None = None, **more: Any) -> dict[str, Any]:
@@ -154,6 +151,16 @@ def test_stitches_that_follow_each_other_are_a_seam_across_a_dart():
     # With another ease in the second half they are two seams.
     given["pattern"]["panels"]["band"]["vertices"][1] = [20.0, 0.0]
     assert len(garmentcode_pattern(given, "p").seams) == 3
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_an_edge_of_less_than_a_millimetre_is_in_one_seam_wherever_its_stitches_begin(turned: bool):
+    front = panel([(0, 0), (15, 0), (15, 0.08), (15, 20), (0, 20)])
+    back = panel([(0, 0), (0, 20), (-15, 20), (-15, 0.05), (-15, 0)])
+    stitches = ["f.1 b.3", "f.2 b.2"]
+    pattern = garmentcode_pattern(file_of({"f": front, "b": back}, stitches[:: -1 if turned else 1]), "p")
+    sewn = [side for seam in pattern.seams for side in seam.stretches]
+    assert len(sewn) == len({(side.piece, side.edge) for side in sewn}) == 4
 
 
 def test_two_straight_sides_of_a_cone_are_a_seam_and_no_dart():
@@ -336,8 +343,8 @@ def test_other_programs_can_read_what_is_written(tmp_path: Path):
         count = len(panel["vertices"])
         assert [edge["endpoints"] for edge in panel["edges"]] == [[k, (k + 1) % count] for k in range(count)]
         assert panel["vertices"][0] == [0.0, 0.0]
-    if DATA is not None:
-        given = json.loads((Path(DATA) / "patterns" / "dress_pencil.json").read_text())
+    if DATA.is_dir():
+        given = json.loads((DATA / "patterns" / "dress_pencil.json").read_text())
         assert given["properties"] == data["properties"]
         assert given.keys() == data.keys()
         assert given["pattern"].keys() == pattern.keys()
@@ -444,8 +451,7 @@ def test_panels_hang_where_the_body_is():
 @needs_data
 @pytest.mark.parametrize(("name", "seams", "darts"), [("dress_pencil", 15, 4), ("shirt_mean", 16, 0)])
 def test_patterns_of_garmentcode_are_drafted(name: str, seams: int, darts: int):
-    assert DATA is not None
-    file = Path(DATA) / "patterns" / f"{name}.json"
+    file = DATA / "patterns" / f"{name}.json"
     given = json.loads(file.read_text())["pattern"]
     drafted = read_drafted(file)
     read = drafted.pattern

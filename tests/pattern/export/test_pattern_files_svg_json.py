@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -13,7 +14,11 @@ import pytest
 
 from warpflat.core.errors import InputError
 from warpflat.pattern.drafting.marker import Cloth, make_marker
-from warpflat.pattern.export.pattern_json import pattern_json, write_pattern_json
+from warpflat.pattern.export.dxf import write_dxf
+from warpflat.pattern.export.garmentcode import write_garmentcode
+from warpflat.pattern.export.pattern_json import pattern_json, read_pattern_json, write_pattern_json
+from warpflat.pattern.export.pdf import write_pdf
+from warpflat.pattern.export.plt import write_plt
 from warpflat.pattern.export.svg import STYLE, write_marker_svg, write_svg
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -179,6 +184,20 @@ def test_the_frame_leads_from_the_piece_to_the_drawing(dress):
         assert data["edges"][0]["line"][0] == pytest.approx(moved.tolist())
 
 
-def test_an_unknown_size_is_refused(dress, tmp_path):
-    with pytest.raises(InputError, match="no size '39'"):
-        write_svg(dress, tmp_path / "p.svg", sizes=["39"])
+@pytest.mark.parametrize("size", ["39", "38"])
+def test_a_size_that_is_not_drafted_is_refused(dress, size, tmp_path):
+    drafted = replace(dress, pieces={"36": dress.pieces["36"]})
+    for write, ending in ((write_svg, "svg"), (write_dxf, "dxf"), (write_plt, "plt"), (write_pdf, "pdf")):
+        with pytest.raises(InputError, match=f"no size '{size}'"):
+            write(drafted, tmp_path / f"p.{ending}", sizes=[size])
+    with pytest.raises(InputError, match=f"no size '{size}'"):
+        write_dxf(drafted, tmp_path / "p.dxf", sizes=[size, "36"], rul=tmp_path / "p.rul")
+    with pytest.raises(InputError, match=f"no size '{size}'"):
+        write_garmentcode(drafted, tmp_path / "p.json", size=size)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_drafted_of_some_sizes_is_read_back(dress, tmp_path):
+    assert dress.sample == "38"
+    write_pattern_json(dress.of_sizes(["36"]), tmp_path / "pattern.json")
+    assert read_pattern_json(tmp_path / "pattern.json").sample == "36"

@@ -6,7 +6,16 @@ from pathlib import Path
 
 import click
 
-from warpflat.app.cli.options import DONE, EXIT_CODES, FAULTY, ComputingCommand, Output, output_options, tell
+from warpflat.app.cli.options import (
+    DONE,
+    EXIT_CODES,
+    FAULTY,
+    ComputingCommand,
+    Output,
+    files_line,
+    output_options,
+    tell,
+)
 from warpflat.app.cli.run import start_warp_silently
 
 __all__ = ["compare"]
@@ -66,8 +75,8 @@ def compare(scene: Path, fabrics: tuple[str, ...], drape: bool, output: Output) 
             }
         )
     ]
-    told = [f"note: {note}" for note in (*comparison.notes, *notes)] if output.tells else []
-    for line in (*told, *warnings):
+    output.tell_notes((*comparison.notes, *notes))
+    for line in warnings:
         tell(line)
-    output.report(folder / "compare.json", lambda: [comparison_table(comparison), f"{folder}: {', '.join(files)}"])
+    output.report(folder / "compare.json", lambda: [comparison_table(comparison), files_line(folder, files)])
     return FAULTY if warnings else DONE

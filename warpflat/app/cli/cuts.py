@@ -9,7 +9,16 @@ from typing import Literal
 
 import click
 
-from warpflat.app.cli.options import DONE, EXIT_CODES, FAULTY, ComputingCommand, Output, output_options, tell
+from warpflat.app.cli.options import (
+    DONE,
+    EXIT_CODES,
+    FAULTY,
+    ComputingCommand,
+    Output,
+    files_line,
+    output_options,
+    tell,
+)
 from warpflat.app.cli.run import report_run, start_warp_silently
 from warpflat.core import InputError
 
@@ -69,6 +78,7 @@ def cuts(
     if edits:
         # Edit a dart, and compare the garment before and after.
         from warpflat.app.cli.tables import edit_table
+        from warpflat.app.review.faults import faults_of
         from warpflat.app.scene.form_edits import edit_dart
         from warpflat.pattern import output_folder, write_report
 
@@ -86,12 +96,15 @@ def cuts(
             data = made.as_dict()
             _write_toml(folder, "The scene's cuts and seams after the edit, instead of its own.", [made.as_toml()])
             write_report(folder / "edit.json", data, name="edit", files=["cuts.toml"])
-        for note in made.notes if output.tells else ():
-            tell(f"note: {note}")
+        output.tell_notes(made.notes)
+        warnings = faults_of(made.after.metrics())
+        for line in warnings:
+            tell(line)
         output.report(
-            folder / "edit.json", lambda: [f"{edit_table(data)}\n\n{made.as_toml()}\n{folder}: edit.json, cuts.toml"]
+            folder / "edit.json",
+            lambda: [edit_table(data), "", made.as_toml(), files_line(folder, ["edit.json", "cuts.toml"])],
         )
-        return DONE if data["after"]["converged"] else FAULTY
+        return FAULTY if warnings else DONE
     if at is not None:
         raise InputError("--at belongs to --rotate and --split")
     from warpflat.app.cli.progress_bar import ProgressBar
@@ -127,12 +140,11 @@ def cuts(
             result = run_scene(with_cut(loaded, chosen.cut), folder, on_progress=bar, device=output.device)
         elif apply is not None:
             result = run_scene(loaded, folder, on_progress=bar, device=output.device, cuts=cuts_of_entry(ledger, apply))
-    for note in ledger.notes if output.tells else ():
-        tell(f"note: {note}")
+    output.tell_notes(ledger.notes)
     if result is None or output.tells:
         output.report(
             folder / "ledger.json",
-            lambda: [f"{ledger_table(ledger)}\n{folder}: {', '.join(['ledger.json', *written])}"],
+            lambda: [ledger_table(ledger), files_line(folder, ["ledger.json", *written])],
         )
     return DONE if result is None else report_run(result, folder, output)
 

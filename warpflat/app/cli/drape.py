@@ -9,7 +9,6 @@ import click
 from warpflat.app.cli.options import (
     DONE,
     EXIT_CODES,
-    FAULTY,
     RUN_FILES,
     ComputingCommand,
     Output,
@@ -17,7 +16,7 @@ from warpflat.app.cli.options import (
     scene_option,
     tell,
 )
-from warpflat.app.cli.run import run_and_report, start_warp_silently
+from warpflat.app.cli.run import report_run, run_and_report, start_warp_silently
 
 __all__ = ["drape"]
 
@@ -80,10 +79,6 @@ def drape(
     """
     from dataclasses import replace
 
-    from warpflat.app.cli.fit_lines import fit_lines
-    from warpflat.app.cli.summary import summary_lines
-    from warpflat.app.cli.tables import drape_lines
-    from warpflat.app.review.faults import faults_of
     from warpflat.app.scene.load import load_scene
     from warpflat.app.scene.outside_pattern import OutsideJob, drape_outside, edge_table, is_pattern_file
     from warpflat.app.scene.schema import DrapeTable
@@ -103,19 +98,7 @@ def drape(
             job, folder, fabric=fabric, shear_limit=shear_limit, size=size, device=output.device, usd=usd,
             correct=correct,
         )  # fmt: skip
-        warnings = faults_of(result.metrics)
-        # What was left out has a line of its own at the end.
-        left = [f"note: {note}" for note in result.notes if note not in result.metrics.get("notes", ())]
-        for line in (*(left if output.tells else ()), *warnings):
-            tell(line)
-
-        def words() -> list[str]:
-            lines = summary_lines(result.metrics, result.files, str(folder))
-            # The folder comes last.
-            return [lines[-1], *fit_lines(result.metrics), *drape_lines(result.metrics)] if output.verbose else lines
-
-        output.report(folder / "metrics.json", words)
-        return FAULTY if warnings else DONE
+        return report_run(result, folder, output)
     of_pattern = {"units": units, "body": body, "fabric": fabric, "seams": seams, "size": size, "edges": edges or None}
     for option, value in of_pattern.items():
         if value is not None:

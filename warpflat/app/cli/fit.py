@@ -13,6 +13,7 @@ from warpflat.app.cli.options import (
     RUN_FILES,
     ComputingCommand,
     Output,
+    files_line,
     output_options,
     scene_option,
     scene_options,
@@ -150,8 +151,8 @@ def fit(
             if keeps_pattern(job, tables)
             else []
         )
-        told = [*([*job.notes, *kept] if output.tells and one is carried[0] else ()), *one.notes]
-        for note in told:
+        output.tell_notes([*job.notes, *kept] if one is carried[0] else ())
+        for note in one.notes:
             tell(f"note: {note}")
         if len(bodies) > 1 and output.tells:
             click.echo(f"{one.body}:")
@@ -161,10 +162,9 @@ def fit(
         if output.tells:
             click.echo(fitted[-1].verdict())
     written, notes = write_study(folder, fitted)
-    for note in notes if output.tells else ():
-        tell(f"note: {note}")
+    output.tell_notes(notes)
     output.report(
         folder / "fit.json",
-        lambda: [*([study_table(fitted)] if len(fitted) > 1 else ()), f"fit: {folder}: {', '.join(written)}"],
+        lambda: [*([study_table(fitted)] if len(fitted) > 1 else ()), f"fit: {files_line(folder, written)}"],
     )
     return code

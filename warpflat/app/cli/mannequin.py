@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from warpflat.app.cli.options import DONE, ComputingCommand, measure_option, out_option, tell
+from warpflat.app.cli.options import DONE, ComputingCommand, files_line, measure_option, out_option, tell
 from warpflat.app.cli.run import start_warp_silently
 from warpflat.core import InputError, require_memory_for_usd
 
@@ -98,7 +98,7 @@ def mannequin(
         click.echo(mannequin_table(body))
         if tapes := measures_table(body):
             click.echo(f"\n{tapes}\n")
-        click.echo(f"{folder}: {', '.join(file.name for file in files.values())}")
+        click.echo(files_line(folder, (file.name for file in files.values())))
     return DONE
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import shlex
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -22,6 +23,7 @@ __all__ = [
     "RUN_FILES",
     "ComputingCommand",
     "Output",
+    "files_line",
     "measure_option",
     "out_option",
     "output_options",
@@ -147,6 +149,11 @@ class Output:
         """Return the folder that was asked for, or one of this name in `out`."""
         return self.out if self.out is not None else Path("out") / name
 
+    def tell_notes(self, notes: Iterable[str]) -> None:
+        """Print notes on standard error, unless the command is to be silent."""
+        for note in notes if self.tells else ():
+            tell(f"note: {note}")
+
     def report(self, file: Path, words: Callable[[], Iterable[str]]) -> None:
         """Print a JSON file that was written, or what came out in lines of words, as was asked for."""
         if self.as_json:
@@ -161,11 +168,16 @@ def tell(line: str) -> None:
     click.echo(f"warpflat: {line}", err=True)
 
 
+def files_line(folder: Path | str, files: Iterable[str]) -> str:
+    """Return a folder, as a shell takes it, and the names of files in it."""
+    return f"{shlex.quote(str(folder))}: {', '.join(files)}"
+
+
 def tell_files(files: Sequence[Path], notes: Iterable[str]) -> None:
     """Print the names of files that have been written into one folder, and the notes on them."""
     for note in notes:
         tell(f"note: {note}")
-    click.echo(f"{files[0].parent}: {', '.join(file.name for file in files)}")
+    click.echo(files_line(files[0].parent, (file.name for file in files)))
 
 
 def output_options(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from warpflat.app.cli.options import DONE, ComputingCommand
+from warpflat.app.cli.options import DONE, ComputingCommand, files_line
 
 __all__ = ["review"]
 
@@ -36,5 +36,5 @@ def review(folder: Path, film: bool, sheet: bool, quiet: bool) -> int:
             start_warp_silently()
             files += write_moving_pictures(folder, film=film, sheet=sheet)
     if not quiet:
-        click.echo(f"{folder}: {', '.join(files)}")
+        click.echo(files_line(folder, files))
     return DONE

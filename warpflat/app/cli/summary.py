@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from warpflat.app.cli.options import files_line
 from warpflat.app.cli.tables import cut_words
 from warpflat.app.review.figures import count_pieces
 from warpflat.core import energy_words, format_count, list_some
@@ -88,10 +89,10 @@ def summary_lines(
         if line
     ]
     # As many names as fit into a line, at least one, and how many more there are.
-    listed = f"{shlex.quote(folder)}: no files"
+    listed = files_line(folder, ["no files"])
     for shown in range(len(ordered), 0, -1):
         more = "" if shown == len(ordered) else f", {len(ordered) - shown} more"
-        listed = f"{shlex.quote(folder)}: {', '.join(ordered[:shown])}{more}"
+        listed = files_line(folder, ordered[:shown]) + more
         if width is None or len(listed) <= width:
             break
     return [*lines, listed]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
+from warpflat.app.cli.options import files_line
 from warpflat.app.review.figures import aligned, relaxation_words, seam_figures
 from warpflat.core import energy_words
 from warpflat.flat import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_names
@@ -60,7 +60,8 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
                 "yes" if piece["stages"][-1]["converged"] else "NO",
             )
         )
-    tables = [aligned(head, rows)]
+    # Of a pattern that was only draped nothing was flattened.
+    tables = [aligned(head, rows)] if rows else []
     if relaxed := relaxation_words(piece["stages"] for piece in metrics["pieces"].values()):
         tables.append(f"relaxed: {relaxed}")
     if metrics.get("seams"):
@@ -110,7 +111,8 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
         tables.append(f"cut from {'; '.join(parts)}")
     if taken := metrics.get("pattern_of_file"):
         tables.append(f"pattern: {cut_words(taken)}")
-    return "\n\n".join(tables) + f"\n{shlex.quote(folder)}: {', '.join(files)}"
+    listed = files_line(folder, files)
+    return "\n\n".join(tables) + f"\n{listed}" if tables else listed
 
 
 def rings_line(rings: Sequence[Mapping[str, Any]]) -> str:

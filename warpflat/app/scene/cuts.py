@@ -238,8 +238,6 @@ def cuts_beside(
         seam: the table of a cut along a whole line of a piece.
     """
     whole = _dart(CutTable.model_validate(dict(seam)))
-    if not whole.parts_piece:
-        return [dict(cut) for cut in cuts]
     gone = {dart.place for dart in taken_over(mannequin.layout, mannequin.vertices, form, [whole])}
     return [dict(cut) for cut in cuts if cut.get("omit") or place_of(cut) not in gone]
 

@@ -65,7 +65,7 @@ def _measures(garment: FormGarment) -> dict[str, Any]:
         "model_energy_j": sum(piece["model_energy_j"] for piece in pieces.values()),
         "outside": metrics["wear"]["outside"],
         "fits": metrics["verdict"]["fits"],
-        "converged": garment.sewn is None or garment.sewn.converged,
+        "converged": all(piece["stages"][-1]["converged"] for piece in pieces.values()),
         "mouths_m": {
             f"{name}.{dart['name']}": dart["intake_m"]
             for name, piece in pieces.items()

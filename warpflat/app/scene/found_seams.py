@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from warpflat.app.scene.load import Scene, errors_named, scene_fabric
 from warpflat.app.scene.schema import FileSurface, FindSeamsTable, SeamCutTable
-from warpflat.app.scene.surface import scene_surface
+from warpflat.app.scene.surface import scene_surface, surface_file
 from warpflat.core import (
     InputError,
     check_values,
@@ -65,8 +65,7 @@ def found_seams(scene: Scene) -> FoundSeams | None:
         return None
     if all_parts and asked.find == "none":
         return None
-    with errors_named(f"{scene.where}: surface.file"):
-        path = scene.path(table.file)
+    path = surface_file(scene, table)
     try:
         read = read_garment(path, units=table.units, prim=table.prim, name=scene.name)
     except InputError:
@@ -261,9 +260,7 @@ def plain_panel(scene: Scene) -> Surface | None:
     if not isinstance(table, FileSurface) or table.component is not None or settings.find_seams or settings.seams_cut:
         return None
     try:
-        with errors_named(f"{scene.where}: surface.file"):
-            path = scene.path(table.file)
-        read = read_mesh_file(path, units=table.units, prim=table.prim, name=scene.name)
+        read = read_mesh_file(surface_file(scene, table), units=table.units, prim=table.prim, name=scene.name)
         surface = scene_surface(scene, read)
     except InputError:
         return None

@@ -366,8 +366,9 @@ def drape_outside(
                 pattern, job.body, fabric=cloth, placement=placement, options=table.options(), device=device
             )
         files, entry = write_drape_files(draped, folder, frames=True, usd=usd), draped.measures()
+        corrected: Sequence[str] = ()
         if correct and not draped.converged:
-            more = [*more, "the pattern was not corrected, as the drape is not at rest; raise max_steps in [drape]"]
+            corrected = ["the pattern was not corrected, as the drape is not at rest; raise max_steps in [drape]"]
         elif correct:
             report_activity("correcting the pattern")
             with errors_named(str(job.path)):
@@ -381,12 +382,14 @@ def drape_outside(
             drawing = PatternOptions(formats=("dxf", "svg"))
             written = write_pattern(lambda: (moved, ()), folder, name=f"{job.name}.corrected", options=drawing)
             files += written.files
-            more = [*more, *written.notes, found.describe()]
+            corrected = [found.describe(), *written.notes]
         files.append("metrics.json")
         body = {} if job.body is None else {"mannequin": job.body.metrics(), "girths": job.girths_on_body()}
         measured = run_metrics({}, wp.get_device(device), {**body, "drape": entry})
         metrics, stale = remove_stale(folder, measured, name=job.name, files=files, drape=True)
-    return SceneResult(metrics=metrics, files=tuple(files), notes=(*pattern.notes, *notes, *more, *stale))
+    # A report in few lines tells the first of them.
+    told = (*corrected, *notes, *more, *pattern.notes, *stale)
+    return SceneResult(metrics=metrics, files=tuple(files), notes=told)
 
 
 def _fabric(job: OutsideJob, name: str | None) -> tuple[Any, Sequence[str]]:

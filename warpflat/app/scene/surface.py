@@ -28,7 +28,7 @@ from warpflat.flat import (
 )
 from warpflat.garment import SewnPanel, read_sewn_panels
 
-__all__ = ["scene_pieces", "scene_sewn_panels", "scene_surface", "with_piece_tables"]
+__all__ = ["scene_pieces", "scene_sewn_panels", "scene_surface", "surface_file", "with_piece_tables"]
 
 
 def scene_surface(scene: Scene, read: tuple[Path, RawMesh, float, list[Path]] | None = None) -> Surface:
@@ -52,7 +52,7 @@ def scene_surface(scene: Scene, read: tuple[Path, RawMesh, float, list[Path]] | 
                 raise InputError(f"{table.shape} has several pieces, and this needs one; take `warpflat run`")
             surface = make_shape(table.shape, **(table.model_extra or {}))
     else:
-        path = _file(scene, table)
+        path = surface_file(scene, table)
         if table.component == "all":
             raise InputError(
                 f'{scene.where}: surface.component: this needs one piece; "all" is for `warpflat run` and `flatten`'
@@ -151,7 +151,7 @@ def scene_pieces(scene: Scene) -> tuple[Surface, ...] | None:
     if not isinstance(table, FileSurface) or table.component != "all":
         return None
     meet = BORDERS_MEET if table.meet_mm is None else 1e-3 * table.meet_mm
-    return read_pieces(_file(scene, table), units=table.units, prim=table.prim, name=scene.name, meet=meet)
+    return read_pieces(surface_file(scene, table), units=table.units, prim=table.prim, name=scene.name, meet=meet)
 
 
 def scene_sewn_panels(scene: Scene) -> list[SewnPanel]:
@@ -163,10 +163,15 @@ def scene_sewn_panels(scene: Scene) -> list[SewnPanel]:
     table = scene.settings.surface
     if not isinstance(table, FileSurface) or table.pattern is None:
         return []
-    return read_sewn_panels(_file(scene, table), units=table.units, prim=table.prim, name=scene.name)
+    return read_sewn_panels(surface_file(scene, table), units=table.units, prim=table.prim, name=scene.name)
 
 
-def _file(scene: Scene, table: FileSurface) -> Path:
+def surface_file(scene: Scene, table: FileSurface) -> Path:
+    """Return where the file of a scene's surface lies.
+
+    Raises:
+        InputError: it does not exist, or an environment variable is not set.
+    """
     with errors_named(f"{scene.where}: surface.file"):
         path = scene.path(table.file)
         with guarded(path, "mesh", missing="does not exist"):

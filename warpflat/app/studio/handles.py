@@ -88,13 +88,12 @@ def _of_darts(plan: FormScenePlan, name: str, flat: FloatArray) -> Iterator[Hand
     form = plan.form
     placed = {dart.name: dart for dart in form.darts if dart.piece == name}
     for dart_name, (left, right) in form.pieces[name].legs().items():
-        dart, apart = placed[dart_name], np.linalg.norm(flat[left] - flat[right], axis=1)
+        dart = placed[dart_name]
         if dart.asked.pleat_mm is not None:
             continue
         part = form.dart_part(dart)
         two_tips = dart_name in form.pieces[name].fisheyes
-        # A dart with two tips is widest inside.
-        mouth = int(apart.argmax()) if two_tips else 0
+        mouth, width = form.pieces[name].mouth(dart_name, flat)
         axis = unit(flat[left[-1]] - 0.5 * (flat[left[0]] + flat[right[0]]))
         # The upper tip may be the first one of the row, or the last.
         ends = form.vertices[dart.row[[0, -1]], 1]
@@ -104,7 +103,7 @@ def _of_darts(plan: FormScenePlan, name: str, flat: FloatArray) -> Iterator[Hand
             yield _slid(f"{what} of {dart_name}", name, flat[left[-end]], axis, change)
         for side, leg, other in (("left", left, right), ("right", right, left)):
             place = flat[leg[mouth]]
-            wider = partial(_widen_mouth, plan, dart, float(apart[mouth]))
+            wider = partial(_widen_mouth, plan, dart, width)
             across = np.array([-axis[1], axis[0]])
             across *= 1.0 if across @ (place - flat[other[mouth]]) >= 0.0 else -1.0
             yield _slid(f"mouth of {dart_name}, {side}", name, place, across, wider)
@@ -155,12 +154,11 @@ def _of_sides(solution: Solution, plan: FormScenePlan, name: str, flat: FloatArr
         for own, form in plan.form.pieces.items():
             lies = np.asarray(solution.pieces[own].positions)
             placed = {dart.name: dart.asked for dart in plan.form.darts if dart.piece == own}
-            for dart_name, (left, right) in form.legs().items():
-                dart, apart = placed[dart_name], np.linalg.norm(lies[left] - lies[right], axis=1)
-                mouth = int(apart.argmax()) if dart_name in form.fisheyes else 0
+            for dart_name, (left, _) in form.legs().items():
+                dart, (mouth, width) = placed[dart_name], form.mouth(dart_name, lies)
                 # Those that are widest at the level, and as wide as the cloth wants.
                 if dart.mouth_mm is None and dart.pleat_mm is None and form.grid_vertices[left[mouth]] in row:
-                    held[dart.place] = replace(dart, mouth_mm=round(1e3 * float(apart[mouth]), 1), like=None)
+                    held[dart.place] = replace(dart, mouth_mm=round(1e3 * width, 1), like=None)
         cuts = _with_darts(plan, *held.values()) if held else {}
         return {**cuts, "ease": {**table, level: round(ease + 100.0 * moved / share, 1)}}
 

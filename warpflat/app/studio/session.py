@@ -128,16 +128,6 @@ class Session:
         """What is to be seen: the preview, if there is one."""
         return self.solution if self.preview is None else self.preview.step.solution
 
-    @property
-    def can_undo(self) -> str:
-        """What can be undone, empty if nothing can."""
-        return self.step.what if self._at else ""
-
-    @property
-    def can_redo(self) -> str:
-        """What can be done again, empty if nothing can."""
-        return self._steps[self._at + 1].what if self._at + 1 < len(self._steps) else ""
-
     def begin(self) -> None:
         """Solve the scene as it is."""
         self._solve()

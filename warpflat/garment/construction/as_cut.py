@@ -97,11 +97,8 @@ def read_cut_pattern(path: str | PathLike[str], *, units: str | None, name: str)
         for each, piece in garment.pieces.items()
     }
     at = worn_at({each: (points, corners) for each, (points, _, corners) in worn.items()}, pattern.seams)
-    pieces = {
-        size: [replace(piece, fabric="", at=at.get(piece.name, "")) for piece in row]
-        for size, row in pattern.pieces.items()
-    }
-    return WornPattern(pattern=replace(pattern, pieces=pieces), surfaces=worn)
+    pattern = pattern.with_each(lambda piece: replace(piece, fabric="", at=at.get(piece.name, "")))
+    return WornPattern(pattern=pattern, surfaces=worn)
 
 
 def worn_at(worn: Mapping[str, tuple[FloatArray, IntArray]], seams: Sequence[Seam]) -> dict[str, str]:

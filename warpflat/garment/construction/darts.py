@@ -121,13 +121,11 @@ def measure_darts(form: FormResult, name: str, positions: FloatArray) -> list[di
     found = []
     for dart, ids in piece.legs().items():
         legs = [positions[leg] for leg in ids]
-        # A fish-eye dart is widest inside.
-        width = np.linalg.norm(legs[0] - legs[1], axis=1)
         found.append(
             {
                 "name": dart,
                 "line": placed[dart].asked.line,
-                "intake_m": float(width.max() if dart in piece.fisheyes else width[0]),
+                "intake_m": piece.mouth(dart, positions)[1],
                 "legs_m": [polyline_length(leg) for leg in legs],
                 "tip_to_point_m": placed[dart].to_point,
                 **({"pleat_m": pleats[name, dart]} if (name, dart) in pleats else {}),

@@ -15,7 +15,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, IntArray, laid_upon, turning_angles
 from warpflat.garment.construction.constraints import Constraint, DrawnLine, FixedLength, KeptGirth, Straight
-from warpflat.pattern import HEMMED_LEVELS, count_inflections, fair_line, fairest_line
+from warpflat.pattern import HEMMED_LEVELS, count_inflections, fair_lines, fairest_line
 
 if TYPE_CHECKING:
     from warpflat.garment.construction.sewn import ConstraintResult
@@ -152,7 +152,7 @@ def plan_curves(
                 book, wanted = "all", np.ones(len(grid), dtype=bool)
             else:
                 book, wanted = "", np.zeros(len(grid), dtype=bool)
-            away = fair_line(points, RULER, straight=wanted, mirrored=mirrored).shift if wanted.any() else 0.0
+            away = next(fair_lines(points, [RULER], wanted, mirrored=mirrored)).shift if wanted.any() else 0.0
             straight = bool(wanted.any()) and away <= bound
             kept = wanted if straight else None
             one_way = book == "below hip" and bool(np.isin(grid, layout.rings[: layout.level_row["waist"] + 1]).all())

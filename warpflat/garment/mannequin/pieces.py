@@ -73,6 +73,13 @@ class FormPiece:
         darts = {dart: (self.edges[left], self.edges[right][::-1]) for dart, (left, right) in self.darts.items()}
         return {**darts, **self.fisheyes}
 
+    def mouth(self, dart: str, positions: FloatArray) -> tuple[int, float]:
+        """Return at which vertex of its legs a dart is widest in a pattern (#P by 2 [m]), and how wide [m]; a fish-eye dart is inside."""
+        left, right = self.legs()[dart]
+        apart = np.linalg.norm(positions[left] - positions[right], axis=1)
+        widest = int(apart.argmax()) if dart in self.fisheyes else 0
+        return widest, float(apart[widest])
+
 
 def cut_pieces(
     layout: Layout,

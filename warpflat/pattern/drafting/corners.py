@@ -58,10 +58,10 @@ class _Border:
         here = self.places
         return self.turning(self.before(here, self.window), here, self.after(here, self.window))
 
-    def distance(self, one: int, other: int) -> float:
-        """Return the length [m] of border between two vertices, the shorter way round."""
-        between = abs(float(self.along[one] - self.along[other]))
-        return min(between, self.length - between)
+    def distance(self, one: IndexArray | int, other: int) -> FloatArray:
+        """Return the length [m] of border between vertices, the shorter way round."""
+        between = np.abs(self.along[one] - self.along[other])
+        return np.minimum(between, self.length - between)
 
 
 def find_corners(ring: FloatArray) -> set[int]:
@@ -98,8 +98,7 @@ def find_corners(ring: FloatArray) -> set[int]:
     taken[corners] = True
     for i in sorted(np.flatnonzero(turns > CORNER).tolist(), key=lambda i: (-turns[i], i)):
         # The window of a corner shows in its neighbours' turns too; the next vertex of a coarse border does not.
-        between = np.abs(border.along[: border.count][taken] - border.along[i])
-        taken[i] |= bool((np.minimum(between, border.length - between) > border.window).all())
+        taken[i] |= bool((border.distance(np.flatnonzero(taken), i) > border.window).all())
     return set(np.flatnonzero(taken).tolist())
 
 

@@ -39,7 +39,7 @@ from warpflat.pattern.drafting.label import Label
 from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.names import dart_words
 from warpflat.pattern.drafting.notches import cut_darts, dart_notches, seam_notches, seam_reports
-from warpflat.pattern.drafting.pieces import Pattern, Piece, Seam
+from warpflat.pattern.drafting.pieces import Pattern, Piece, Place, Seam
 from warpflat.pattern.drafting.placement import default_grain, place_label
 from warpflat.pattern.drafting.polygons import mapped, upright
 from warpflat.pattern.drafting.seam_difference import SEAM_TOLERANCE
@@ -265,14 +265,14 @@ def _fitted_edges(
     """Return the edges of all pieces as curves with trued corners, by piece, and a report on each."""
     import shapely
 
-    lines: dict[tuple[str, str], FloatArray] = {}
+    lines: dict[Place, FloatArray] = {}
     for piece in pieces:
         frame = _frame(piece)
         lines |= {(piece.name, edge.name): mapped(edge.points, frame) for edge in piece.edges}
     fitted = fit_edges(pieces, lines, seams, tolerance)
     curves = equal_sides(pieces, seams, {key: curve for key, (curve, _) in fitted.items()})
     corners = list[CornerReport]()
-    trued: Mapping[tuple[str, str], Curve] = curves
+    trued: Mapping[Place, Curve] = curves
     if true:
         # Turned ends change lengths a little, too.
         trued, corners = true_corners(pieces, seams, curves)

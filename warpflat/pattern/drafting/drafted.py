@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from warpflat.core import FloatArray, IntArray, arc_lengths, points_at_lengths, 
 from warpflat.pattern.drafting.curves import Curve
 from warpflat.pattern.drafting.label import Label
 from warpflat.pattern.drafting.piece_parts import Dart, Edge
-from warpflat.pattern.drafting.pieces import Pattern, Piece
+from warpflat.pattern.drafting.pieces import Pattern, Piece, unknown_size
 from warpflat.pattern.drafting.seam_difference import LOCAL_TOLERANCE, SEAM_TOLERANCE
 from warpflat.pattern.drafting.truing import CornerReport
 
@@ -209,11 +209,34 @@ class DraftedGarment:
     @property
     def piece_names(self) -> tuple[str, ...]:
         """Names of the pieces of all sizes, those of the first size first."""
-        return tuple(dict.fromkeys(piece.name for row in self.pieces.values() for piece in row))
+        return tuple(dict.fromkeys(piece.name for piece in self))
 
     def all_sizes(self, name: str) -> tuple[DraftedPiece, ...]:
         """Return one piece in the sizes that have it, in the order of the sizes."""
-        return tuple(p for pieces in self.pieces.values() for p in pieces if p.name == name)
+        return tuple(piece for piece in self if piece.name == name)
+
+    def of_sizes(self, sizes: Collection[str] | None) -> DraftedGarment:
+        """Return the garment in some of its sizes, which keep their order; None keeps all.
+
+        Raises:
+            InputError: a size that is not drafted; gives the nearest.
+        """
+        for size in sizes or ():
+            if size not in self.pieces:
+                raise unknown_size(self.name, size, self.pieces)
+        return (
+            self
+            if sizes is None
+            else replace(self, pieces={size: self.pieces[size] for size in self.pieces if size in sizes})
+        )
+
+    def with_each(self, change: Callable[[DraftedPiece], DraftedPiece]) -> DraftedGarment:
+        """Return the garment with a change made to each of its pieces, in all sizes."""
+        return replace(self, pieces={size: tuple(map(change, row)) for size, row in self.pieces.items()})
+
+    def __iter__(self) -> Iterator[DraftedPiece]:
+        for pieces in self.pieces.values():
+            yield from pieces
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

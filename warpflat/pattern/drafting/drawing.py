@@ -14,7 +14,7 @@ from warpflat.pattern.drafting.curves import Curve, fit_curve
 from warpflat.pattern.drafting.draft import nest_label
 from warpflat.pattern.drafting.drafted import DraftedEdge, DraftedPiece
 from warpflat.pattern.drafting.drafted_darts import fisheye_legs
-from warpflat.pattern.drafting.label import TAILS, Label, Words, text_width
+from warpflat.pattern.drafting.label import TAILS, Label, Words, printed_size, text_width
 from warpflat.pattern.drafting.measures import name_in_units
 from warpflat.pattern.drafting.names import name_without_number
 from warpflat.pattern.drafting.piece_parts import HEMMED_LEVELS, LEFT_OUT
@@ -134,7 +134,6 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
     names = [each.name for each in pieces[0].edges if each.kind not in ("fold", "dart")]
     shared = [name for name in names if all(name in {each.name for each in piece.edges} for piece in pieces)]
     edge = max(shared, key=lambda name: shift_across(name) * pieces[0].edge(name).length ** 0.5, default="")
-    sizes = ", ".join(piece.size for piece in pieces)
     drawings = list[Drawing]()
     for index, piece in enumerate(pieces):
         # Dashes of several sizes upon each other would be a full line.
@@ -148,7 +147,7 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
             others = [stroke for other in pieces if other is not piece for stroke in _detail_strokes(other)]
             slits = [shapely.LineString(stroke.points) for stroke in others if stroke.role == "notch"]
             # It names all sizes in place of its own, no wider than it is.
-            one, every = translate("size {size}", size=piece.size), translate("sizes {sizes}", sizes=sizes)
+            one, every = printed_size(piece.size), printed_size(*(each.size for each in pieces))
             text, rows = as_sentence(every), label.words()
             for number, row in enumerate(rows):
                 if row.text == as_sentence(one):

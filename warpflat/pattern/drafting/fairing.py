@@ -11,7 +11,7 @@ from scipy.linalg import solve_banded
 from warpflat.core import BoolArray, FloatArray, arc_lengths, points_at_lengths, unit
 from warpflat.pattern.drafting.curves import farthest
 
-__all__ = ["FairLine", "bend_one_way", "count_inflections", "fair_line", "fair_lines", "fairest_line"]
+__all__ = ["FairLine", "bend_one_way", "count_inflections", "fair_lines", "fairest_line"]
 
 #: A line is faired at places this far apart [m], but at no fewer and no more of them than this.
 STEP, FEWEST, MOST = 0.003, 24, 200
@@ -71,29 +71,6 @@ def _changes_of_bend(angles: list[float]) -> int:
     return count
 
 
-def fair_line(
-    points: FloatArray,
-    wave: float,
-    *,
-    straight: BoolArray | None = None,
-    met: BoolArray | None = None,
-    mirrored: tuple[bool, bool] = (False, False),
-) -> FairLine:
-    """Return the line p that minimises the integral of |p - p0|^2 + (wave / 2 pi)^6 |p'''|^2 along its length.
-
-    A wave of the given length loses half of its height, a shorter one more. Circles stay nearly as they are: what is
-    kept small is the change of curvature (Moreton and Sequin 1992).
-
-    Args:
-        points: #P by 2 [m], p0.
-        wave: [m].
-        straight: #P, points in a row that come to lie on one straight line, if some do.
-        met: #P, points that the line goes through, as those at which a girth was measured; of a straight row only where it allows.
-        mirrored: whether the line goes on beyond its first and its last point as its mirror image in an upright line.
-    """
-    return next(fair_lines(points, [wave], straight, met, mirrored))
-
-
 def fair_lines(
     points: FloatArray,
     waves: Iterable[float],
@@ -101,7 +78,18 @@ def fair_lines(
     met: BoolArray | None = None,
     mirrored: tuple[bool, bool] = (False, False),
 ) -> Iterator[FairLine]:
-    """Yield the line of :func:`fair_line` for each wave [m]; the waves share the equations."""
+    """Yield for each wave the line p that minimises the integral of |p - p0|^2 + (wave / 2 pi)^6 |p'''|^2 along its length.
+
+    A wave of the given length loses half of its height, a shorter one more. Circles stay nearly as they are: what is
+    kept small is the change of curvature (Moreton and Sequin 1992). The waves share the equations.
+
+    Args:
+        points: #P by 2 [m], p0.
+        waves: [m].
+        straight: #P, points in a row that come to lie on one straight line, if some do.
+        met: #P, points that the line goes through, as those at which a girth was measured; of a straight row only where it allows.
+        mirrored: whether the line goes on beyond its first and its last point as its mirror image in an upright line.
+    """
     places, even = _evenly(points)
     is_straight, weight = _straight_places(points, places, straight), _weights(points, places, met)
     first = 0
@@ -140,14 +128,14 @@ def fair_lines(
 def bend_one_way(
     points: FloatArray, wave: float, *, straight: BoolArray | None = None, met: BoolArray | None = None
 ) -> FairLine | None:
-    """Return the line that is as near and as fair as that of :func:`fair_line` among those that bend to one side only.
+    """Return the line that is as near and as fair as that of :func:`fair_lines` among those that bend to one side only.
 
     The line is a graph over the chord of its ends: a straight line and hinges of one sign (non-negative least squares).
 
     Args:
         points: #P by 2 [m].
-        wave: as in :func:`fair_line` [m].
-        straight, met: as in :func:`fair_line`.
+        wave: one of those of :func:`fair_lines` [m].
+        straight, met: as in :func:`fair_lines`.
 
     Returns:
         The line; None if it is no graph over its chord.
@@ -187,7 +175,7 @@ def fairest_line(
     """Return the line within a bound that has few inflections for little shift; None if no line is within it.
 
     Args:
-        points, straight, met, mirrored: as in :func:`fair_line`.
+        points, straight, met, mirrored: as in :func:`fair_lines`.
         bound: [m].
         one_way: whether a line that bends to one side only is preferred, with the longest wave within the bound.
         gentle: whether a corner is drawn as a curve, too, as far as the bound allows, if that takes no inflection more and hardly turns

@@ -13,7 +13,7 @@ from warpflat.core import FloatArray, arc_lengths, polyline_length, segment_leng
 from warpflat.pattern.drafting.curves import TOLERANCE, Curve, chords, farthest, fit_curve
 from warpflat.pattern.drafting.fairing import fair_lines
 from warpflat.pattern.drafting.piece_parts import SAME_POINT
-from warpflat.pattern.drafting.pieces import Piece, Seam
+from warpflat.pattern.drafting.pieces import Piece, Place, Seam
 from warpflat.pattern.drafting.seam_difference import (
     LOCAL_TOLERANCE,
     SEAM_TOLERANCE,
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "TOLERANCES",
-    "EdgeKey",
     "as_in_layout",
     "drawn_length",
     "equal_sides",
@@ -36,9 +35,6 @@ __all__ = [
     "smooth_line",
     "uncrossed",
 ]
-
-#: Names of a piece and of its edge.
-EdgeKey = tuple[str, str]
 
 #: How far [m] curves may lie from a border: the first is for clean meshes, the others are tried on ragged ones.
 TOLERANCES = (TOLERANCE, 3e-4, 1e-3, 2e-3)
@@ -67,8 +63,8 @@ BUMPS, OF_FIRST, IN_PARTS = (1, 2, 4, 8), 10.0, 100.0
 
 
 def fit_edges(
-    pieces: Sequence[Piece], lines: Mapping[EdgeKey, FloatArray], seams: Sequence[Seam], tolerance: float | None
-) -> dict[EdgeKey, tuple[Curve, float]]:
+    pieces: Sequence[Piece], lines: Mapping[Place, FloatArray], seams: Sequence[Seam], tolerance: float | None
+) -> dict[Place, tuple[Curve, float]]:
     """Fit a curve to every edge, and return it with how far [m] it was allowed to keep from the points.
 
     Each curve keeps within the tolerance of its points, and as near to the length of its chords as that allows. Where
@@ -93,7 +89,7 @@ def fit_edges(
             fitted[piece.name, edge.name] = as_it_is if edge.as_drawn else _clean_curve(line, tolerance)
     if tolerance is None:
         # Edges that are sewn to one other edge, whether they run against each other, and the second's ease.
-        pairs = list[tuple[EdgeKey, EdgeKey, bool, float]]()
+        pairs = list[tuple[Place, Place, bool, float]]()
         for seam in sewn:
             (one, *more), (other, *others) = seam.sides
             ends = one.place, other.place
@@ -149,8 +145,8 @@ def fit_edges(
 
 
 def uncrossed(
-    pieces: Sequence[Piece], lines: Mapping[EdgeKey, FloatArray], curves: Mapping[EdgeKey, Curve]
-) -> dict[EdgeKey, Curve]:
+    pieces: Sequence[Piece], lines: Mapping[Place, FloatArray], curves: Mapping[Place, Curve]
+) -> dict[Place, Curve]:
     """Return the curves with chords for those that cross themselves or each other, or all fall into one line.
 
     Where chords beside curves cross, too, all edges of the piece get theirs, as its layout has them.
@@ -189,9 +185,7 @@ def _encloses(outline: Sequence[LineString]) -> bool:
     return len(ring) > 2 and bool(shapely.Polygon(ring).is_valid)
 
 
-def equal_sides(
-    pieces: Sequence[Piece], seams: Sequence[Seam], curves: Mapping[EdgeKey, Curve]
-) -> dict[EdgeKey, Curve]:
+def equal_sides(pieces: Sequence[Piece], seams: Sequence[Seam], curves: Mapping[Place, Curve]) -> dict[Place, Curve]:
     """Return the curves with the sides of each seam as long as they should be, to some micrometres.
 
     Curves that keep near their points, and turned corners, leave a seam's sides some tenths of a millimetre apart. The curves of
@@ -225,7 +219,7 @@ def equal_sides(
             continue
         more -= np.copysign(ALIKE, more)
         # How the difference grows with each bump, over its cost.
-        ways, total = dict[EdgeKey, dict[int, FloatArray]](), 0.0
+        ways, total = dict[Place, dict[int, FloatArray]](), 0.0
         for row, of_side in zip(seam.sides, (-(1.0 + seam.ease), 1.0), strict=True):
             for key in (side.place for side in row):
                 line = found[key].sample()
@@ -287,8 +281,8 @@ def _bumps(ways: Mapping[int, FloatArray], at: FloatArray) -> tuple[FloatArray, 
 
 
 def as_in_layout(
-    lines: Mapping[EdgeKey, FloatArray], seams: Sequence[Seam], curves: Mapping[EdgeKey, Curve]
-) -> dict[EdgeKey, Curve]:
+    lines: Mapping[Place, FloatArray], seams: Sequence[Seam], curves: Mapping[Place, Curve]
+) -> dict[Place, Curve]:
     """Return the curves with chords along both sides of each seam that would differ as drawn, and by more than in the layout.
 
     No smooth line near a ragged border may be as long as that; its chords are.
@@ -393,7 +387,7 @@ def is_wavy(curve: Curve) -> bool:
 
 
 def _along_sides(
-    seam: Seam, lines: Mapping[EdgeKey, FloatArray], curves: Mapping[EdgeKey, tuple[Curve, float]]
+    seam: Seam, lines: Mapping[Place, FloatArray], curves: Mapping[Place, tuple[Curve, float]]
 ) -> tuple[FloatArray, FloatArray]:
     """Return the lengths along both sides of a seam at their points [m], joints once."""
     first, second = (
@@ -405,8 +399,8 @@ def _along_sides(
 
 def _differences(
     seam: Seam,
-    lines: Mapping[EdgeKey, FloatArray],
-    curves: Mapping[EdgeKey, tuple[Curve, float]],
+    lines: Mapping[Place, FloatArray],
+    curves: Mapping[Place, tuple[Curve, float]],
     laid: tuple[FloatArray, FloatArray] | None = None,
 ) -> tuple[float, float]:
     """Return by how much the sides of a seam differ as a whole, and over a short stretch, each over what is allowed."""

@@ -173,11 +173,10 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
     lines += [cutting_words(piece, count) + (f" - {cloth}" if cloth else "") for cloth, count in cloths]
     allowances = []
     for kind, values in allowances_of(((edge.kind, edge.width) for edge in piece.edges), piece.units).items():
-        if values:
-            # The unit once: "6/10 mm".
-            numbers = [value.removesuffix(f" {piece.units}") for value in values]
-            widths = f"{'/'.join(numbers) if piece.units != 'in' else ', '.join(numbers)} {piece.units}"
-            allowances.append(translate(f"{kind} {{widths}}", widths=widths))
+        # The unit once: "6/10 mm".
+        numbers = [value.removesuffix(f" {piece.units}") for value in values]
+        widths = f"{'/'.join(numbers) if piece.units != 'in' else ', '.join(numbers)} {piece.units}"
+        allowances.append(translate(f"{kind} {{widths}}", widths=widths))
     if allowances:
         lines.append(translate("Includes {allowances}", allowances=", ".join(allowances)))
     title = garment.replace("_", " ")
@@ -195,7 +194,7 @@ def allowances_of(edges: Iterable[tuple[str, float]], units: str) -> dict[str, l
     for kind, width in edges:
         if kind in ("seam", "hem", "dart", "cut") and width > 0:
             widths["hem" if kind == "hem" else "seam"].add(round(width, 4))
-    return {kind: [length_words(width, units) for width in sorted(row)] for kind, row in widths.items()}
+    return {kind: [length_words(width, units) for width in sorted(row)] for kind, row in widths.items() if row}
 
 
 def cutting_words(piece: Piece, count: int) -> str:
@@ -207,6 +206,9 @@ def cutting_words(piece: Piece, count: int) -> str:
     return translate("Cut {count}", count=count)
 
 
-def printed_size(size: str) -> str:
-    """Return the words for a size as they are printed."""
+def printed_size(*sizes: str) -> str:
+    """Return the words for a size, or for several, as they are printed."""
+    if len(sizes) > 1:
+        return translate("sizes {sizes}", sizes=", ".join(sizes))
+    (size,) = sizes
     return translate("size {size}", size=size) if size_words(size) != size else translate(size)

@@ -56,17 +56,9 @@ class Sheet:
     reserved: FloatArray | None = None
 
 
-def nests(garment: DraftedGarment, sizes: Sequence[str] | None = None) -> list[tuple[DraftedPiece, ...]]:
-    """Return each piece in all its drafted sizes, or in some of them.
-
-    Raises:
-        InputError: an unknown size.
-    """
-    for size in sizes or ():
-        garment.pattern.check_size(size)
-    rows = (garment.all_sizes(name) for name in garment.piece_names)
-    chosen = (tuple(piece for piece in row if sizes is None or piece.size in sizes) for row in rows)
-    return [row for row in chosen if row]
+def nests(garment: DraftedGarment) -> list[tuple[DraftedPiece, ...]]:
+    """Return each piece in all its drafted sizes."""
+    return [garment.all_sizes(name) for name in garment.piece_names]
 
 
 def covered_rings(group: Sequence[DraftedPiece]) -> list[FloatArray]:

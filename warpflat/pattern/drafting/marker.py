@@ -14,7 +14,6 @@ from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.label import Label, printed_size
 from warpflat.pattern.drafting.matched_lay import Stripes
 from warpflat.pattern.drafting.names import size_words
-from warpflat.pattern.drafting.pieces import unknown_size
 from warpflat.pattern.drafting.placement import fit_label
 from warpflat.pattern.drafting.polygons import mapped, mirror_image, outer_ring, rotation
 from warpflat.pattern.drafting.tile_nesting import CELL, nest_on_strip
@@ -311,15 +310,13 @@ def _copies(garment: DraftedGarment, fabric: str, sizes: Mapping[str, int]) -> l
     """Return the copies to be cut, each with whether it is mirrored."""
     copies = []
     for size, count in sizes.items():
-        if size not in garment.pieces:
-            raise unknown_size(garment.name, size, garment.pieces)
         if count < 1:
             raise InputError(f"{count} garments of size {size}; it must be 1 or more")
-        for piece in garment.pieces[size]:
+        for piece in garment.of_sizes([size]):
             quantity = piece.piece.cloths.get(fabric, 0) if fabric else piece.piece.quantity
             copies += [(piece, over) for over in piece.piece.turned_over(quantity) * count]
     if not copies:
-        known = {cloth for pieces in garment.pieces.values() for piece in pieces for cloth in piece.piece.cloths}
+        known = {cloth for piece in garment for cloth in piece.piece.cloths}
         raise InputError(f"no piece is of fabric {fabric!r}; {nearest(fabric, known)}")
     return copies
 

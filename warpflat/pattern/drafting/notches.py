@@ -9,7 +9,7 @@ import numpy as np
 from warpflat.core import FloatArray, arc_lengths, points_at_lengths, unit
 from warpflat.pattern.drafting.allowance import CutOutline
 from warpflat.pattern.drafting.drafted import DraftedPiece, Notch, SeamReport
-from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
+from warpflat.pattern.drafting.pieces import Piece, Place, Seam, SeamSide
 from warpflat.pattern.drafting.seam_difference import (
     LOCAL_TOLERANCE,
     eased_length,
@@ -58,8 +58,7 @@ def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size
             laid = (lines[0].laid, lines[1].laid) if seam.as_laid else None
             worst = worst_difference(lines[0].places, lines[1].places, seam.ease, seam.eased, laid=laid)
         # A notch meets a notch or a joint of the other side; of equal edges one is drawn, and its notches are those of all.
-        alike = {name for name, group in groups.items() if group == groups[seam.name]}
-        marked = [line.marked(alike) for line in lines]
+        marked = [line.marked(groups[seam.name]) for line in lines]
         joints = [np.concatenate([row, line.joints]) for row, line in zip(marked, lines, strict=True)]
         gaps = [
             float(np.abs(joints[1 - side] - opposite_length(seam, lines, side, at)).min())
@@ -97,20 +96,20 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
     """
     lines = [[SeamLine(side, pieces) for side in seam.sides] for seam in seams]
     # Where each edge is sewn: number and side of the seam, place in that side.
-    sewn: dict[tuple[str, str], list[tuple[int, int, int]]] = {}
+    sewn: dict[Place, list[tuple[int, int, int]]] = {}
     for number, seam in enumerate(seams):
         for at, row in enumerate(seam.sides):
             for place, side in enumerate(row):
                 sewn.setdefault(side.place, []).append((number, at, place))
     groups = copied_together(seams)
     #: By group of seams and edge the lengths along it at which it has a notch.
-    placed: dict[tuple[str, str, str], list[float]] = {}
+    placed: dict[tuple[frozenset[str], str, str], list[float]] = {}
     notches: dict[str, list[Notch]] = {}
 
     def place_all(number: int, side: int, length: float, double: bool, clear: float) -> bool:
         """Place a notch and all that meet it; none, and return False, if one cannot be cut or lies within `clear` of a joint."""
         waiting, seen = [(number, side, length)], list[tuple[int, int, float]]()
-        found: dict[tuple[str, str, str], list[float]] = {}
+        found: dict[tuple[frozenset[str], str, str], list[float]] = {}
         made: list[tuple[str, Notch]] = []
         while waiting:
             number, side, length = waiting.pop()
@@ -184,18 +183,17 @@ def opposite_length(seam: Seam, lines: Sequence[SeamLine], side: int, length: fl
     return float(np.interp(length / lines[side].length, *table)) * lines[1 - side].length
 
 
-def copied_together(seams: Sequence[Seam]) -> dict[str, str]:
-    """Return by seam the first of all seams that are sewn along copies of its edges, each of which is drawn once."""
-    first: dict[str, str] = {seam.name: seam.name for seam in seams}
-    at: dict[tuple[str, str], dict[tuple[bool, int], str]] = {}
+def copied_together(seams: Sequence[Seam]) -> dict[str, frozenset[str]]:
+    """Return by seam all that are sewn along copies of its edges, each of which is drawn once; the seam is among them."""
+    groups = {seam.name: frozenset((seam.name,)) for seam in seams}
+    at: dict[Place, dict[tuple[bool, int], str]] = {}
     for seam in seams:
         for side in seam.stretches:
             at.setdefault(side.place, {}).setdefault((side.mirrored, side.copy), seam.name)
     for copies in at.values():
-        joined = {first[name] for name in copies.values()}
-        into = next(name for name in first if first[name] in joined)
-        first = {name: first[into] if group in joined else group for name, group in first.items()}
-    return first
+        joined = frozenset[str]().union(*(groups[name] for name in copies.values()))
+        groups |= dict.fromkeys(joined, joined)
+    return groups
 
 
 def cut_darts(pieces: Mapping[str, DraftedPiece]) -> list[Seam]:

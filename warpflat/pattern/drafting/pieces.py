@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
@@ -18,11 +18,24 @@ from warpflat.pattern.drafting.seam_difference import eased_length
 from warpflat.pattern.drafting.words import translate_name
 from warpflat.pattern.drafting.worn import Worn
 
-__all__ = ["Elastic", "OpeningKind", "Pattern", "Piece", "Role", "Seam", "SeamSide", "check_hole", "unknown_size"]
+__all__ = [
+    "Elastic",
+    "OpeningKind",
+    "Pattern",
+    "Piece",
+    "Place",
+    "Role",
+    "Seam",
+    "SeamSide",
+    "check_hole",
+    "unknown_size",
+]
 
 
 #: Kinds of :class:`SeamOpening`.
 OpeningKind = Literal["zip", "buttons", "slit", "vent"]
+#: Names of a piece and of an edge of it.
+Place = tuple[str, str]
 #: What a piece is, or is derived as.
 Role = Literal[
     "shell", "facing", "strip", "waistband", "cuff", "collar", "hood", "lining", "interfacing", "pocket", "placket", "tie", "fly"
@@ -185,7 +198,7 @@ class SeamSide:
     copy: int = 0
 
     @property
-    def place(self) -> tuple[str, str]:
+    def place(self) -> Place:
         """Names of the piece and the edge."""
         return self.piece, self.edge
 
@@ -355,8 +368,8 @@ class Pattern:
                         )
                     if edge.kind == "fold":
                         raise InputError(f"seam {seam.name!r}: edge {side} lies on the fold and cannot be sewn")
-        if self.sample_size is not None and self.sample_size not in self.pieces:
-            raise unknown_size(self.name, self.sample_size, self.pieces)
+        if self.sample_size is not None:
+            self.check_size(self.sample_size)
         seen = [seam.name for seam in self.seams]
         if len(set(seen)) < len(seen):
             raise InputError(f"garment {self.name!r}: a seam's name occurs twice; names are unique")
@@ -365,6 +378,10 @@ class Pattern:
     def sizes(self) -> tuple[str, ...]:
         """Sizes in their order."""
         return tuple(self.pieces)
+
+    def with_each(self, change: Callable[[Piece], Piece]) -> Pattern:
+        """Return the pattern with a change made to each of its pieces, in all sizes."""
+        return replace(self, pieces={size: tuple(map(change, row)) for size, row in self.pieces.items()})
 
     def without(self, names: Collection[str]) -> Pattern:
         """Return the pattern without pieces of these names, and without their seams.

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from warpflat.core import InputError
 from warpflat.pattern.drafting.names import unnumbered
-from warpflat.pattern.drafting.pieces import Seam, SeamSide
+from warpflat.pattern.drafting.pieces import Place, Seam, SeamSide
 
 __all__ = ["joint_words", "seam_words", "seams_of_words"]
 
@@ -23,12 +23,12 @@ def joint_words(seam: Seam) -> str:
     return f"{first} to {second}" if first != second else f"seam of the {first}"
 
 
-def seam_words(seams: Iterable[Seam]) -> dict[tuple[str, str], list[str]]:
+def seam_words(seams: Iterable[Seam]) -> dict[Place, list[str]]:
     """Return what is written at each edge, by piece and edge: "NAME | side 1 part 1 | against mirrored | ease 0.03 0 1".
 
     The third part says how the seam runs along the edge, whether the edge is one of a copy that is cut turned over, and which copy.
     """
-    found: dict[tuple[str, str], list[str]] = {}
+    found: dict[Place, list[str]] = {}
     for seam in seams:
         for number, chain in enumerate(seam.sides, start=1):
             for part, side in enumerate(chain, start=1):

@@ -19,10 +19,10 @@ from warpflat.core import other_side, turn_between, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.names import unnumbered
-from warpflat.pattern.drafting.pieces import Seam, SeamOpening, SeamSide
+from warpflat.pattern.drafting.pieces import Place, Seam, SeamOpening, SeamSide
 from warpflat.pattern.drafting.polygons import signed_area
 from warpflat.pattern.drafting.seam_words import joint_words
-from warpflat.pattern.drafting.sewing_tasks import GATHERED, Place, SewingTasks, Task, pieces_of, techniques
+from warpflat.pattern.drafting.sewing_tasks import GATHERED, SewingTasks, Task, pieces_of, techniques
 from warpflat.pattern.drafting.words import letters_of, translate, translate_name
 
 __all__ = [

@@ -13,13 +13,11 @@ from warpflat.core import other_side, polyline_length, read_toml, without_side
 from warpflat.pattern.drafting.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drafting.measures import length_words
 from warpflat.pattern.drafting.names import line_name
-from warpflat.pattern.drafting.pieces import Elastic, Piece, Seam, SeamSide
+from warpflat.pattern.drafting.pieces import Elastic, Piece, Place, Seam, SeamSide
 from warpflat.pattern.drafting.words import listed, translate, translate_name
 
-__all__ = ["GATHERED", "Place", "SewingTasks", "Task", "is_flounce", "piece_titles", "pieces_of", "techniques"]
+__all__ = ["GATHERED", "SewingTasks", "Task", "is_flounce", "piece_titles", "pieces_of", "techniques"]
 
-#: A piece and an edge of it, by their names.
-Place = tuple[str, str]
 #: How the edges of a facing that is grown on begin, which lie beyond the line on which it is folded.
 _GROWN_ON = "facing "
 # What is longer by more than this share is gathered; less is eased in.
@@ -106,7 +104,7 @@ class SewingTasks:
         # Seams that are each other's mirror images are sewn alike.
         groups: dict[object, list[Seam]] = {}
         copied = {s.place for seam in self.seams for s in seam.stretches if s.copy}
-        alike: dict[tuple[str, str], object] = {}
+        alike: dict[Place, object] = {}
         images: dict[object, object] = {}
         for seam in self.seams:
             # Edges of equal pieces, of which one is drawn, have the notches of one seam.
@@ -380,7 +378,7 @@ class SewingTasks:
         self._add("hang", [name for name in shell if is_flounce(self.pieces[name])])
         for technique, kind in (("hem", "hem"), ("bind_raw", "seam"), ("raw", "cut")):
             self._add(technique, [], self._take_of(self.pieces, (kind,)))
-        self._close(list(self.drafted.values()))
+        self._close()
 
     def _finish_parts(self, joined: Collection[str]) -> None:
         """Add interfacings, ties, darts, pockets, straps and plackets."""
@@ -450,9 +448,9 @@ class SewingTasks:
         notion = translate(f"{{count}} {word} of {{length}}, at most {{width}} wide", count=elastic.count, **values)
         self.tasks[-1].notions.append(notion)
 
-    def _close(self, drafted: Sequence[DraftedPiece]) -> None:
+    def _close(self) -> None:
         """Add what closes the garment, with its notions: zips, buttons, hooks."""
-        zipped = False
+        drafted, zipped = list(self.drafted.values()), False
         # Zips that run on beyond the lower end of their seam.
         running = {
             (each.style, each.length): each.begin

@@ -53,16 +53,13 @@ def enlarged(garment: DraftedGarment, shrinkage: Shrinkage, fabric: str) -> Draf
     """
     if not (shrinkage.warp or shrinkage.weft):
         return garment
-    pieces = {
-        size: tuple(
+    return garment.with_each(
+        lambda piece: (
             replace(resized(piece, shrinkage.factors), notes=(*piece.notes, shrinkage.words))
             if piece.piece.fabric == fabric
             else piece
-            for piece in row
         )
-        for size, row in garment.pieces.items()
-    }
-    return replace(garment, pieces=pieces)
+    )
 
 
 def as_worn(piece: DraftedPiece) -> DraftedPiece:

@@ -9,8 +9,7 @@ import numpy as np
 
 from warpflat.core import FloatArray, arc_lengths, turn_between, unit
 from warpflat.pattern.drafting.curves import Curve, cubic_weights, split_bezier
-from warpflat.pattern.drafting.fitting import EdgeKey
-from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
+from warpflat.pattern.drafting.pieces import Piece, Place, Seam, SeamSide
 
 __all__ = ["CornerReport", "true_corners", "turned_end"]
 
@@ -26,7 +25,7 @@ LEAST_TURN = np.radians(0.05)
 ROUNDS = 2
 
 #: The end of an edge: the edge, and whether it is its last point.
-End = tuple[EdgeKey, bool]
+End = tuple[Place, bool]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +57,7 @@ class _Corner:
     outer: tuple[End, ...]
     wanted: float
 
-    def angle(self, curves: Mapping[EdgeKey, Curve]) -> float:
+    def angle(self, curves: Mapping[Place, Curve]) -> float:
         """Return the sum of the angles [rad] inside the pieces, between an edge and the next one, counter-clockwise."""
         total = 0.0
         for arrive, leave in self.ends:
@@ -67,8 +66,8 @@ class _Corner:
 
 
 def true_corners(
-    pieces: Sequence[Piece], seams: Sequence[Seam], curves: Mapping[EdgeKey, Curve]
-) -> tuple[dict[EdgeKey, Curve], list[CornerReport]]:
+    pieces: Sequence[Piece], seams: Sequence[Seam], curves: Mapping[Place, Curve]
+) -> tuple[dict[Place, Curve], list[CornerReport]]:
     """Turn the ends of edges until the edges run on smoothly across seams and closed darts, and meet folds squarely.
 
     The turns are the smallest, by least squares over all corners, so that each piece takes its half of a difference.
@@ -147,7 +146,7 @@ def true_corners(
     return trued, reports
 
 
-def _least_turns(corners: Sequence[_Corner], shares: FloatArray, curves: Mapping[EdgeKey, Curve]) -> dict[End, float]:
+def _least_turns(corners: Sequence[_Corner], shares: FloatArray, curves: Mapping[Place, Curve]) -> dict[End, float]:
     """Return the smallest turns outwards [rad] of edges' ends that give all corners their wanted angles.
 
     Args:

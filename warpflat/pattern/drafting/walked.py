@@ -45,8 +45,7 @@ def walk_seams(drafted: DraftedGarment) -> tuple[WalkedSeam, ...]:
                     cosine, sine = np.array([x * u + y * v, u * y - v * x]) / (np.hypot(x, y) * np.hypot(u, v))
                     part = (part - part[0]) @ np.array([[cosine, sine], [-sine, cosine]]) + joined[-1]
                 joined = np.concatenate([joined, part[1:] if len(joined) else part])
-            alike = {name for name, group in groups.items() if group == groups[seam.name]}
-            first, second = (line.marked(alike) for line in lines)
+            first, second = (line.marked(groups[seam.name]) for line in lines)
             second = np.array([opposite_length(seam, lines, 1, float(at)) for at in second])
             walked.append(
                 WalkedSeam(

@@ -11,7 +11,7 @@ import numpy as np
 from warpflat.core import FloatArray, InputError
 from warpflat.pattern.drafting.drafted_darts import fisheye_legs
 from warpflat.pattern.drafting.piece_parts import Edge, Hole
-from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
+from warpflat.pattern.drafting.pieces import Piece, Place, Seam, SeamSide
 from warpflat.pattern.drafting.polygons import mirror_image
 
 __all__ = ["MIRRORED", "hole_edges", "turn_over", "whole_pieces"]
@@ -72,7 +72,7 @@ def whole_pieces(
             also = {cloth: max(number // count, 1) for cloth, number in piece.also.items()}
             whole[name] = replace(piece, quantity=max(piece.quantity // count, 1), paired=False, also=also)
     found: list[Seam] = []
-    taken: set[tuple[str, str]] = set()
+    taken: set[Place] = set()
     # Seams on the other side of the body.
     flipped = []
     for seam in seams:
@@ -90,11 +90,11 @@ def whole_pieces(
         taken |= edges
         found.append(plain)
     for piece in whole.values():
-        darts = [(dart.name, dart.left, dart.right) for dart in piece.darts]
-        darts += [(hole.name, f"{hole.name} left", f"{hole.name} right") for hole in piece.holes if hole.kind == "dart"]
-        for name, left, right in darts:
-            legs = SeamSide(piece=piece.name, edge=left), SeamSide(piece=piece.name, edge=right, reversed=True)
-            found.append(Seam(name=f"{piece.name}.{name}", sides=((legs[0],), (legs[1],))))
+        found += piece.dart_seams
+        for eye in (hole for hole in piece.holes if hole.kind == "dart"):
+            left = SeamSide(piece=piece.name, edge=f"{eye.name} left")
+            right = SeamSide(piece=piece.name, edge=f"{eye.name} right", reversed=True)
+            found.append(Seam(name=f"{piece.name}.{eye.name}", sides=((left,), (right,))))
     left_out = sorted(set(given) - sewn)
     notes = [f"left out, as no seam joins them: {', '.join(left_out)}"] if left_out else []
     return whole, found, notes

@@ -75,15 +75,13 @@ def write_dxf(
         raise InputError(f"unknown DXF dialect {dialect!r}; {nearest(dialect, DIALECTS)}")
     if units not in UNITS:
         raise InputError(f"unknown DXF units {units!r}; {nearest(units, UNITS)}")
-    chosen = tuple(garment.pieces) if sizes is None else tuple(sizes)
-    scale, created = UNITS[units], source_date()
-    sample = garment.pattern.sample if garment.pattern.sample in chosen else chosen[0]
-    rules = grade_rules(garment, chosen, sample) if rul is not None and len(chosen) > 1 else None
+    garment, scale, created = garment.of_sizes(sizes), UNITS[units], source_date()
+    rules = grade_rules(garment) if rul is not None and len(garment.pieces) > 1 else None
     blocks, space, taken = list[str](), list[str](), set[str]()
     seams = seam_words(garment.pattern.seams)
-    names = {piece.name: piece.piece.title or piece.name for row in garment.pieces.values() for piece in row}
+    names = {piece.name: piece.piece.title or piece.name for piece in garment}
     written = titles(list(dict.fromkeys(names.values())), lambda name: any(map(str.isalnum, _ascii(name))))
-    for placed in lay_out(nests(garment, chosen)).placed:
+    for placed in lay_out(nests(garment)).placed:
         for piece in placed.pieces:
             title, cloths = written[names[piece.name]], piece.piece.cloths
             name = block_name(piece, taken, title)
@@ -119,7 +117,7 @@ def write_dxf(
         f"STYLE NAME: {garment.name}",
         *made,
         program[0],
-        f"SAMPLE SIZE: {sample}",
+        f"SAMPLE SIZE: {garment.sample}",
         *([f"GRADE RULE TABLE: {table}"] if rules is not None and table else []),
         f"UNITS: {units.upper()}",
         *program[1:],
@@ -319,20 +317,20 @@ class GradeRules:
         return len(self.moves)
 
 
-def grade_rules(garment: DraftedGarment, sizes: Sequence[str], sample: str) -> GradeRules:
+def grade_rules(garment: DraftedGarment) -> GradeRules:
     """Return the grade rules of a nest, from the sample size to each size: rule 1 moves nothing.
 
     Graded are the corners of the cutting line, places between them on curved edges, notches and drill holes; each is the same
     place in every size. A place, or a piece, that some size does not have is not graded.
     """
-    rules = GradeRules(sizes=tuple(sizes), sample=sample)
-    rules.rule(np.zeros((len(sizes), 2)))
-    for piece in garment.pieces[sample]:
-        all_sizes = {each.size: each for each in garment.all_sizes(piece.name)}
-        if not all(size in all_sizes for size in sizes):
+    rules = GradeRules(sizes=tuple(garment.pieces), sample=garment.sample)
+    rules.rule(np.zeros((len(rules.sizes), 2)))
+    for piece in garment.pieces[rules.sample]:
+        all_sizes = garment.all_sizes(piece.name)
+        if len(all_sizes) < len(rules.sizes):
             continue
-        rows = [_places(all_sizes[size]) for size in sizes]
-        graded = rows[list(sizes).index(sample)]
+        rows = [_places(each) for each in all_sizes]
+        graded = rows[rules.sizes.index(rules.sample)]
         for key, at in graded.items():
             if all(key in row for row in rows):
                 moves = np.array([row[key] - at for row in rows])

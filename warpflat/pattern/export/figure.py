@@ -63,9 +63,7 @@ def new_figure(width: float, height: float, *, dpi: int = DPI, **options: Any) -
 
 
 @contextmanager
-def drawn_page(
-    path: str | os.PathLike[str], width: float = PAGE_WIDTH, height: float = 4.0, *, dpi: int = DPI
-) -> Iterator[Pen]:
+def drawn_page(path: str | os.PathLike[str], width: float, height: float, *, dpi: int = DPI) -> Iterator[Pen]:
     """Give the pen of a white page of a size [in] in a block, and write the page after it; atomically, with all letters.
 
     Raises:

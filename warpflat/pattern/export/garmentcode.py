@@ -15,8 +15,7 @@ from scipy.spatial.transform import Rotation
 from warpflat.core import FloatArray, arc_lengths, points_at_lengths, turning_angles
 from warpflat.pattern.drafting.curves import CHORD, TOLERANCE, cubic_weights
 from warpflat.pattern.drafting.drafted import DraftedGarment
-from warpflat.pattern.drafting.fitting import EdgeKey
-from warpflat.pattern.drafting.pieces import Piece, Seam, SeamSide
+from warpflat.pattern.drafting.pieces import Piece, Place, Seam, SeamSide
 from warpflat.pattern.drafting.whole_pieces import whole_pieces
 from warpflat.pattern.export.read_garmentcode import CENTIMETRES, LABELS
 from warpflat.pattern.files.output import atomic_path
@@ -57,17 +56,16 @@ def garmentcode_json(garment: DraftedGarment, *, size: str | None = None) -> tup
     Raises:
         InputError: an unknown size, or a piece that cannot be unfolded.
     """
-    chosen = garment.pattern.sample if size is None else size
-    garment.pattern.check_size(chosen)
+    chosen = garment.of_sizes([garment.sample if size is None else size])
     left_out = [
         f"{piece.name}: GarmentCode knows no {what}: {', '.join(names)} left out"
-        for piece in garment.pieces[chosen]
+        for piece in chosen
         for what, names in (("holes", [*piece.cutouts, *piece.fisheyes]), ("lines inside", piece.internal_lines))
         if names
     ]
     # Pieces are along their drawn lines, in their plane, without what GarmentCode does not know.
     drawn = list[Piece]()
-    for drafted in garment.pieces[chosen]:
+    for drafted in chosen:
         own, frame = drafted.piece, np.vstack([drafted.frame, [0.0, 0.0, 1.0]])
         drawn.append(
             replace(
@@ -84,7 +82,7 @@ def garmentcode_json(garment: DraftedGarment, *, size: str | None = None) -> tup
     lines = {(name, edge.name): edge.points for name, piece in pieces.items() for edge in piece.edges}
     stitched, splits, notes = _stitched(pieces, seams, lines)
     left_out += notes
-    number: dict[tuple[EdgeKey, float], int] = {}
+    number: dict[tuple[Place, float], int] = {}
     panels: dict[str, Any] = {}
     places = _places(pieces, seams, lines)
     for name, piece in pieces.items():
@@ -125,12 +123,12 @@ def garmentcode_json(garment: DraftedGarment, *, size: str | None = None) -> tup
 
 
 def _stitched(
-    pieces: Mapping[str, Piece], seams: Sequence[Seam], lines: Mapping[EdgeKey, FloatArray]
-) -> tuple[list[tuple[tuple[_Split, ...], str]], dict[EdgeKey, list[_Split]], list[str]]:
+    pieces: Mapping[str, Piece], seams: Sequence[Seam], lines: Mapping[Place, FloatArray]
+) -> tuple[list[tuple[tuple[_Split, ...], str]], dict[Place, list[_Split]], list[str]]:
     """Split all edges: return which parts are stitched to each other, with their seam, all parts by edge, and what is left out."""
     pleats = {f"{name}.{dart.name}": dart.pleat for name, piece in pieces.items() for dart in piece.darts}
-    splits: dict[EdgeKey, list[_Split]] = {key: [] for key in lines}
-    stitched, sewn, left_out = list[tuple[tuple[_Split, ...], str]](), set[EdgeKey](), list[str]()
+    splits: dict[Place, list[_Split]] = {key: [] for key in lines}
+    stitched, sewn, left_out = list[tuple[tuple[_Split, ...], str]](), set[Place](), list[str]()
     for seam in seams:
         edges = {side.place for side in seam.stretches}
         if sewn & edges:
@@ -231,7 +229,7 @@ class _Split:
         is_curved: whether it is no straight line.
     """
 
-    key: EdgeKey
+    key: Place
     begin: float
     at: float
     reversed: bool
@@ -256,7 +254,7 @@ class _Strand:
     corners: FloatArray
 
     @classmethod
-    def of(cls, chain: Sequence[SeamSide], lines: Mapping[EdgeKey, FloatArray]) -> _Strand:
+    def of(cls, chain: Sequence[SeamSide], lines: Mapping[Place, FloatArray]) -> _Strand:
         points = [lines[side.piece, side.edge][:: -1 if side.reversed else 1] for side in chain]
         arcs = [arc_lengths(line) for line in points]
         ends = np.concatenate([[0.0], np.cumsum([arc[-1] for arc in arcs])])
@@ -351,7 +349,7 @@ def _cubic(points: FloatArray) -> tuple[FloatArray, float]:
 
 
 def _places(
-    pieces: Mapping[str, Piece], seams: Sequence[Seam], lines: Mapping[EdgeKey, FloatArray]
+    pieces: Mapping[str, Piece], seams: Sequence[Seam], lines: Mapping[Place, FloatArray]
 ) -> dict[str, FloatArray]:
     """Return where each piece hangs: its own place, before a piece that it is sewn to, or beside the body."""
     places = {name: piece.placement for name, piece in pieces.items() if piece.placement is not None}

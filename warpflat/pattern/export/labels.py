@@ -48,7 +48,7 @@ def draw_lines(
     drawn: DrawnView,
     datum: str | None,
     page: tuple[float, float, float, float],
-    others: Sequence[DrawnView] = (),
+    others: Sequence[DrawnView],
 ) -> list[str]:
     """Draw the lines of a view with their names, none of them on the cloth of other views; return the names for which there was no room."""
     lines = dict[str, FloatArray]()

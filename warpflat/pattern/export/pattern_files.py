@@ -157,11 +157,13 @@ def export_patterns(
         raise InputError(
             "pattern.json holds all sizes, since the other formats are made from it: leave out the size, or take dxf, svg or pdf"
         )
+    if "garmentcode" in formats and sizes is not None and len(sizes) > 1:
+        raise InputError(f"a file of GarmentCode holds one size: give one --size, not {', '.join(sizes)}")
     with _rewritten(source, out, allowance, units, over_itself="json" in formats) as (drafted, folder, name, files):
-        notes = list(drafted.pattern.notes)
+        drafted, notes = drafted.of_sizes(sizes), list(drafted.pattern.notes)
         for format in formats:
             written, lost = _write(
-                drafted, folder, format, name=name, dialect=dialect, paper=paper, sizes=sizes, english=units == "in"
+                drafted, folder, format, name=name, dialect=dialect, paper=paper, english=units == "in"
             )
             files += written
             notes += lost
@@ -267,7 +269,6 @@ def write_pattern(
     from warpflat.pattern.drafting.draft import draft_garment
     from warpflat.pattern.drafting.seam_difference import LOCAL_TOLERANCE
     from warpflat.pattern.drafting.walked import walk_seams
-    from warpflat.pattern.export.pdf import too_many_sheets
 
     _check_formats(options.formats)
     if options.tolerance is not None and not (is_number(options.tolerance) and options.tolerance >= 0.0):
@@ -278,41 +279,33 @@ def write_pattern(
     heard = list[LeftOut]()
     with listening_to_left_out(heard.append):
         with optional_step("no pattern was drawn", folder=Path(to)) as not_drawn:
-            pattern, notes = make()
+            pattern, known = make()
             # In the printed names and units that were asked for.
-            titled = {
-                size: tuple(
-                    replace(piece, title=options.names.get(piece.name, ""), units=options.units) for piece in row
-                )
-                for size, row in pattern.pieces.items()
-            }
-            drafted = draft_garment(
-                replace(pattern, pieces=titled, words=options.words), tolerance=options.tolerance, true=options.true
+            pattern = replace(pattern, words=options.words).with_each(
+                lambda piece: replace(piece, title=options.names.get(piece.name, ""), units=options.units)
             )
+            drafted = draft_garment(pattern, tolerance=options.tolerance, true=options.true)
         if not_drawn:
             return WrittenPattern(notes=tuple(not_drawn), metrics={"pattern": {"not_drawn": _reason(not_drawn[0])}})
-        pieces = [piece for row in drafted.pieces.values() for piece in row]
-        ragged: dict[str, float] = {}
-        for piece in pieces:
+        notes, ragged = list(known), dict[str, float]()
+        for piece in drafted:
             for edge in piece.edges:
                 if options.tolerance is None and edge.tolerance > TOLERANCE:
                     name_of = f"{piece.name}.{edge.name}"
                     ragged[name_of] = max(ragged.get(name_of, 0.0), edge.fit_error)
         if ragged:
             within = max(ragged.values()) * 1000
-            notes = (
-                *notes, f"the border is ragged at {', '.join(ragged)}: the curves keep within {within:.1f} mm of it",
-            )  # fmt: skip
-        notes = (*notes, *(f"{piece.name}: {note}" for piece in pieces for note in piece.notes))
+            notes.append(f"the border is ragged at {', '.join(ragged)}: the curves keep within {within:.1f} mm of it")
+        notes += [f"{piece.name}: {note}" for piece in drafted for note in piece.notes]
         missed = [
             seam for seam in drafted.seams if seam.notches_mm is not None and seam.notches_mm > 1000 * LOCAL_TOLERANCE
         ]
-        notes = (*notes, *(f"{seam.name}: its notches miss each other by {seam.notches_mm:.1f} mm" for seam in missed))
+        notes += [f"{seam.name}: its notches miss each other by {seam.notches_mm:.1f} mm" for seam in missed]
         walked = walk_seams(drafted)
         drafted = enlarged(drafted, options.shrinkage, next(iter(pattern)).fabric)
         near = [seam.local_mm for seam in drafted.seams if seam.local_mm is not None]
-        edges = [edge for row in drafted.pieces.values() for piece in row for edge in piece.edges]
-        cloths = cut_list(drafted.pieces[drafted.pattern.sample])
+        edges = [edge for piece in drafted for edge in piece.edges]
+        cloths = cut_list(drafted.pieces[drafted.sample])
         metrics: dict[str, Any] = {
             # How far curves stray from the mesh, and sides of seams from each other, at worst.
             "pattern": {
@@ -333,28 +326,36 @@ def write_pattern(
                 for seam in drafted.seams
             ],
         }
-        refused = too_many_sheets(drafted, options.paper) if "pdf" in options.formats else ""
-        notes = (*notes, f"pattern.pdf was left out: {refused}") if refused else notes
-        with output_folder(to) as folder:
-            files = list[str]()
-            for kind in FORMATS:
-                if kind in options.formats and not (kind == "pdf" and refused):
-                    with optional_step(f"{FORMATS[kind].format(name)} was left out", folder=folder):
-                        written, lost = _write(
-                            drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper
-                        )
-                        files += written
-                        notes = (*notes, *lost)
-            if options.cloth is not None:
-                with optional_step("no marker was made", folder=folder) as not_made:
-                    marked, remarks, plans = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
-                    files += marked
-                    notes = (*notes, *remarks)
-                    metrics["marker"] = plans[0]
-                if not_made:
-                    metrics["marker"] = {"not_made": _reason(not_made[0])}
-    notes = (*notes, *(step.note for step in heard))
-    return WrittenPattern(files=tuple(files), notes=tuple(dict.fromkeys(notes)), metrics=metrics, walked=walked)
+        written = _write_files(drafted, to, name=name, options=options)
+    notes += [*written.notes, *(step.note for step in heard)]
+    return replace(written, notes=tuple(dict.fromkeys(notes)), metrics={**metrics, **written.metrics}, walked=walked)
+
+
+def _write_files(drafted: DraftedGarment, to: str | Path, *, name: str, options: PatternOptions) -> WrittenPattern:
+    """Write the files of a drafted pattern, and its marker, whose measures are the metrics; what cannot be written is left out."""
+    from warpflat.pattern.export.pdf import too_many_sheets
+
+    files, notes, metrics = list[str](), list[str](), dict[str, Any]()
+    refused = too_many_sheets(drafted, options.paper) if "pdf" in options.formats else ""
+    notes += [f"pattern.pdf was left out: {refused}"] if refused else []
+    with output_folder(to) as folder:
+        for kind in FORMATS:
+            if kind in options.formats and not (kind == "pdf" and refused):
+                with optional_step(f"{FORMATS[kind].format(name)} was left out", folder=folder):
+                    written, lost = _write(
+                        drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper
+                    )
+                    files += written
+                    notes += lost
+        if options.cloth is not None:
+            with optional_step("no marker was made", folder=folder) as not_made:
+                marked, remarks, plans = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
+                files += marked
+                notes += remarks
+                metrics["marker"] = plans[0]
+            if not_made:
+                metrics["marker"] = {"not_made": _reason(not_made[0])}
+    return WrittenPattern(files=tuple(files), notes=tuple(notes), metrics=metrics)
 
 
 def pattern_names(name: str, formats: Iterable[str], *, marker: bool = False) -> list[str]:
@@ -388,7 +389,6 @@ def _write(
     name: str,
     dialect: str,
     paper: str,
-    sizes: Sequence[str] | None = None,
     english: bool = False,
 ) -> tuple[list[str], tuple[str, ...]]:
     """Write one format and return the names of its files, and what it leaves out."""
@@ -405,20 +405,17 @@ def _write(
     report_activity(f"writing {file.name}")
     if kind == "dxf":
         # Of several sizes the rules by which they are graded are a file of their own.
-        graded = len(drafted.pieces if sizes is None else sizes) > 1
-        rul = file_in(folder, name, ".rul") if graded else None
+        rul = file_in(folder, name, ".rul") if len(drafted.pieces) > 1 else None
         files += [] if rul is None else [rul.name]
-        write_dxf(drafted, file, dialect=dialect, units="english" if english else "metric", sizes=sizes, rul=rul)
+        write_dxf(drafted, file, dialect=dialect, units="english" if english else "metric", rul=rul)
     elif kind == "svg":
-        write_svg(drafted, file, sizes=sizes)
+        write_svg(drafted, file)
     elif kind == "pdf":
-        write_pdf(drafted, file, paper=paper, sizes=sizes)
+        write_pdf(drafted, file, paper=paper)
     elif kind == "plt":
-        write_plt(drafted, file, sizes=sizes)
+        write_plt(drafted, file)
     elif kind == "garmentcode":
-        if sizes is not None and len(sizes) > 1:
-            raise InputError(f"a file of GarmentCode holds one size: give one --size, not {', '.join(sizes)}")
-        lost = write_garmentcode(drafted, file, size=None if sizes is None else sizes[0])
+        lost = write_garmentcode(drafted, file)
     else:
         write_pattern_json(drafted, file)
     return files, lost
@@ -441,9 +438,7 @@ def _marker(
     from warpflat.pattern.export.svg import write_marker_svg
 
     report_activity(f"laying the marker, {seconds} s at most")
-    cloths = list(
-        dict.fromkeys(each for row in drafted.pieces.values() for piece in row for each in piece.piece.cloths)
-    )
+    cloths = list(dict.fromkeys(each for piece in drafted for each in piece.piece.cloths))
     names, remarks, plans, stems = list[str](), list[str](), list[dict[str, Any]](), list[str]()
     for number, fabric in enumerate(cloths):
         own = cloth if number == 0 else replace(cloth, stripes=Stripes())

@@ -413,7 +413,7 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
         "warpflat": __version__,
         "units": "m",
         "name": garment.name,
-        "sample_size": pattern.sample,
+        "sample_size": garment.sample,
         "words": dict(pattern.words),
         "sizes": sizes,
         "cut_list": {size: _plain(cut_list(pieces)) for size, pieces in garment.pieces.items()},

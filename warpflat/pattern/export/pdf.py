@@ -86,10 +86,7 @@ def write_pdf(
     with printed_in(garment.pattern.words):
         if paper not in PAPERS:
             raise InputError(f"unknown paper {paper!r}; {nearest(paper, PAPERS)}")
-        chosen = tuple(garment.pieces) if sizes is None else tuple(sizes)
-        for size in chosen:
-            garment.pattern.check_size(size)
-        whole = replace(garment, pieces={size: row for size, row in garment.pieces.items() if size in chosen})
+        whole = garment.of_sizes(sizes)
         printed = halved(whole)
         if fault := too_many_sheets(printed, paper):
             raise InputError(f"{path}: {fault}")
@@ -217,7 +214,7 @@ def too_many_sheets(garment: DraftedGarment, paper: str) -> str:
     step = float(np.prod(PAPERS[paper].step))
 
     def sheets_of(drafted: DraftedGarment) -> float:
-        return sum(shapely.Polygon(piece.cut_line).area for row in drafted.pieces.values() for piece in row) / step
+        return sum(shapely.Polygon(piece.cut_line).area for piece in drafted) / step
 
     sheets = sheets_of(garment)
     sheets = sheets_of(halved(garment)) if sheets > MOST_SHEETS else sheets
@@ -244,21 +241,21 @@ def _pages(
     from reportlab.pdfbase.pdfdoc import PDFArray, PDFDictionary, PDFName, PDFResourceDictionary, PDFString, xObjectName
     from reportlab.pdfgen.canvas import Canvas
 
-    kind, stream, chosen = tiling.paper, BytesIO(), tuple(whole.pieces)
+    kind, stream = tiling.paper, BytesIO()
     # Streams in bytes: as text they are a quarter longer, and take as long to write as all strokes.
     rl_config.useA85 = 0
     canvas = Canvas(stream, pagesize=(kind.width * POINT, kind.height * POINT), invariant=1)
     for name in (FONT, BOLD):
         pdfmetrics.registerFont(embedded_font(name))
-    canvas.setTitle(f"{whole.name}, {' / '.join(chosen)}")
+    canvas.setTitle(f"{whole.name}, {' / '.join(whole.pieces)}")
     canvas.setCreator("warpflat")
     canvas.setViewerPreference("PrintScaling", "None")
-    _sheet_form(canvas, printed, tiling, drawings, chosen)
+    _sheet_form(canvas, printed, tiling, drawings)
     # Words are drawn on the sheets that show them whole; on all, if none does.
-    forms = _word_forms(canvas, tiling, drawings, chosen)
+    forms = _word_forms(canvas, tiling, drawings, list(printed.pieces))
     if guide:
         if kind.tiled:
-            legend_page(canvas, printed, chosen, tiling.sheet, tiling)
+            legend_page(canvas, printed, tiling)
         # What is read at the machine is small, whatever the pattern is printed on.
         small = kind if kind.tiled else PAPERS["A4"]
         canvas.setPageSize((small.width * POINT, small.height * POINT))
@@ -283,12 +280,12 @@ def _pages(
             canvas.drawString(*((names[tile] - corner + kind.margin) * POINT), title)
         page_footer(canvas, whole.name, kind, translate("sheet {name}", name=title))
         canvas.showPage()
-    if len(chosen) > 1:
+    if len(whole.pieces) > 1:
         # Layers, one a size, are optional content that readers list and can hide.
         document = canvas._doc
         groups = {
             f"size{k}": document.Reference(PDFDictionary({"Type": PDFName("OCG"), "Name": PDFString(f"Size {size}")}))
-            for k, size in enumerate(chosen)
+            for k, size in enumerate(whole.pieces)
         }
         for name in ("sheet", *forms.values()):
             form = document.idToObject[xObjectName(name)]
@@ -303,13 +300,7 @@ def _pages(
     return stream.getvalue()
 
 
-def _sheet_form(
-    canvas: Any,
-    printed: DraftedGarment,
-    tiling: Tiling,
-    drawings: Sequence[tuple[Drawing, ...]],
-    chosen: Sequence[str],
-) -> None:
+def _sheet_form(canvas: Any, printed: DraftedGarment, tiling: Tiling, drawings: Sequence[tuple[Drawing, ...]]) -> None:
     """Draw the whole sheet once, as a form; every page shows its part of it. What is of one size is on that size's layer."""
     border, sheet, widen = 0.05, tiling.sheet, tiling.paper.line_width
     low, high = np.array([-border, -3.0]), sheet.size + 3.0
@@ -317,7 +308,7 @@ def _sheet_form(
     for placed, sizes in zip(sheet.placed, drawings, strict=True):
         nested = len(placed.pieces) > 1
         for drawing in sizes:
-            index = chosen.index(drawing.piece.size)
+            index = list(printed.pieces).index(drawing.piece.size)
             shown = [stroke for stroke in drawing.strokes if not stroke.hidden]
             of_size = [stroke for stroke in shown if nested and stroke.role in OF_LAYER]
             for stroke in (stroke for stroke in shown if not (nested and stroke.role in OF_LAYER)):
@@ -329,7 +320,7 @@ def _sheet_form(
             if nested:
                 canvas._code.append("EMC")
     if sheet.reserved is not None:
-        draw_legend(canvas, sheet.reserved, printed, chosen, tiling.paper.name)
+        draw_legend(canvas, sheet.reserved, printed, tiling.paper.name)
     canvas.endForm()
 
 

@@ -144,7 +144,6 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     allowances = [
         translate(f"{kind}s {{width}}", width=listed(widths))
         for kind, widths in allowances_of(edges, pattern.units).items()
-        if widths
     ]
     told = "Allowances are included: {allowances}." if allowances else "No allowances are included."
     grain = translate("Lay every grain arrow along the selvedge.")

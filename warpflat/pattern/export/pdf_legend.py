@@ -11,7 +11,6 @@ import numpy as np
 from warpflat.core import FloatArray
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.drafting.label import FONT, printed_size
-from warpflat.pattern.drafting.layout import Sheet
 from warpflat.pattern.drafting.measures import INCH
 from warpflat.pattern.drafting.placement import fit_label
 from warpflat.pattern.drafting.sewing_tasks import piece_titles
@@ -45,13 +44,12 @@ _KEY = (
 )
 
 
-def draw_legend(canvas: Any, at: FloatArray, garment: DraftedGarment, sizes: Sequence[str], paper: str) -> None:
+def draw_legend(canvas: Any, at: FloatArray, garment: DraftedGarment, paper: str) -> None:
     """Draw title, both test squares, the request not to scale, and the key, in a block whose lower left is `at` [m]."""
-    x, top = float(at[0]), float(at[1]) + LEGEND_SIZE[1]
+    x, top, sizes = float(at[0]), float(at[1]) + LEGEND_SIZE[1], list(garment.pieces)
     _text(canvas, x, top - 0.008, garment.name.replace("_", " "), 18, bold=True)
     if any(sizes):
-        words = printed_size(sizes[0]) if len(sizes) == 1 else translate("sizes {sizes}", sizes=", ".join(sizes))
-        _text(canvas, x, top - 0.016, as_sentence(words), 11)
+        _text(canvas, x, top - 0.016, as_sentence(printed_size(*sizes)), 11)
     _text(canvas, x, top - 0.025, translate("Print at 100 % (actual size). Do not fit to the page."), 10, bold=True)
     _text(
         canvas,
@@ -80,18 +78,18 @@ def draw_legend(canvas: Any, at: FloatArray, garment: DraftedGarment, sizes: Seq
             y = top - 0.097 - 0.006 * row
             dashes = SIZE_DASHES[index % len(SIZE_DASHES)]
             _sample(canvas, x + 0.001 + 0.045 * column, y, SIZE_COLOURS[index % len(SIZE_COLOURS)], 0.5, dashes)
-            _text(canvas, x + 0.023 + 0.045 * column, y - 0.0012, translate("size {size}", size=size), 8)
+            _text(canvas, x + 0.023 + 0.045 * column, y - 0.0012, printed_size(size), 8)
 
 
-def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], sheet: Sheet, tiling: Tiling) -> None:
+def legend_page(canvas: Any, garment: DraftedGarment, tiling: Tiling) -> None:
     """Draw the first page of a tiled pattern, and end the page."""
     import shapely
 
-    paper = tiling.paper
+    paper, sheet = tiling.paper, tiling.sheet
     low = np.array([paper.margin + 0.005, paper.height - paper.margin - LEGEND_SIZE[1] - 0.002])
-    draw_legend(canvas, low, garment, sizes, paper.name)
+    draw_legend(canvas, low, garment, paper.name)
     # Unused room for the sizes' lines is not left empty.
-    y = float(low[1]) - 0.004 + (0.026 if len(sizes) == 1 else 0.0)
+    y = float(low[1]) - 0.004 + (0.026 if len(garment.pieces) == 1 else 0.0)
     lines = [
         translate(
             "Cut each sheet along its left and upper line. Lay it on the lines of its left and upper neighbours, so that"
@@ -107,7 +105,7 @@ def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], shee
         y -= 0.0042
     # All sheets and pieces, small.
     width = LEGEND_SIZE[0]
-    step, overlap = tiling.paper.step, tiling.paper.overlap
+    step, overlap = paper.step, paper.overlap
     total = np.array([tiling.columns * step[0] + overlap, tiling.rows * step[1] + overlap])
     scale = float(min(width / total[0], (y - paper.margin - 0.010) / total[1]))
     left = float(low[0]) + (width - scale * total[0]) / 2

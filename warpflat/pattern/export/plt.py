@@ -40,7 +40,7 @@ def write_plt(garment: DraftedGarment, path: str | os.PathLike[str], *, sizes: S
         InputError: an unknown size.
     """
     written: dict[int, list[str]] = {pen: [] for pen in (_MARKS, 2, 1)}
-    for placed in lay_out(nests(garment, sizes)).placed:
+    for placed in lay_out(nests(garment.of_sizes(sizes))).placed:
         with printed_in(garment.pattern.words):
             drawings = draw_nest(placed.pieces)
         for drawing in drawings:

@@ -393,8 +393,10 @@ def _chains(panels: Mapping[str, _Panel], partners: Partners) -> list[_Chain]:
         beside, runs, _ = partners[following]
         if beside != (step if same_way else back)[other] or runs != same_way:
             return None
-        eased = abs(length[beside] - length[following] * length[other] / length[edge])
-        return following if eased <= SEAM_TOLERANCE else None
+        # As long by the other's ease, whichever of the four is the longest: a short edge says little of the ease.
+        one, two = (length[edge], length[other]), (length[following], length[beside])
+        apart = abs(one[0] * two[1] - one[1] * two[0]) / max(*one, *two)
+        return following if apart <= SEAM_TOLERANCE else None
 
     found, used = list[_Chain](), set[EdgeKey]()
     for edge in partners:

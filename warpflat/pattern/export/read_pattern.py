@@ -66,33 +66,22 @@ def read_drafted(
             return found
         garment = _printed_in(found.pattern, units)
         with printed_in(garment.words):
-            rows = {
-                size: tuple(
-                    relabelled(replace(piece, piece=garment.piece(piece.name, size)), garment.name, ()) for piece in row
-                )
-                for size, row in found.pieces.items()
-            }
-        return replace(found, pattern=garment, pieces=rows)
+            return replace(found, pattern=garment).with_each(
+                lambda piece: relabelled(replace(piece, piece=garment.piece(piece.name, piece.size)), garment.name, ())
+            )
     with guarded(Path(path), "pattern"):
-        wide = {
-            size: [
-                replace(
-                    piece,
-                    edges=[each if each.kind == "dart" else replace(each, allowance=allowance) for each in piece.edges],
-                )
-                for piece in row
-            ]
-            for size, row in found.pieces.items()
-        }
-        return draft_garment(_printed_in(replace(found, pieces=wide), units), true=False)
+        wide = found.with_each(
+            lambda piece: replace(
+                piece,
+                edges=[each if each.kind == "dart" else replace(each, allowance=allowance) for each in piece.edges],
+            )
+        )
+        return draft_garment(_printed_in(wide, units), true=False)
 
 
 def _printed_in(pattern: Pattern, units: str | None) -> Pattern:
     """Return a pattern whose printed lengths are in these units; None leaves them."""
-    if units is None:
-        return pattern
-    rows = {size: [replace(piece, units=units) for piece in row] for size, row in pattern.pieces.items()}
-    return replace(pattern, pieces=rows)
+    return pattern if units is None else pattern.with_each(lambda piece: replace(piece, units=units))
 
 
 def _read_json(path: Path) -> Pattern | DraftedGarment:

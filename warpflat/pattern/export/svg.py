@@ -60,16 +60,16 @@ def write_svg(garment: DraftedGarment, path: str | os.PathLike[str], *, sizes: S
         path: of the file.
         sizes: those to draw; None draws all.
     """
-    sheet = lay_out(nests(garment, sizes))
+    garment = garment.of_sizes(sizes)
+    sheet = lay_out(nests(garment))
     page = SvgPage(float(sheet.size[0]), float(sheet.size[1]), garment.name)
     seams = seam_words(garment.pattern.seams)
-    drawn = [size for size in garment.pieces if sizes is None or size in sizes]
     for placed in sheet.placed:
         with printed_in(garment.pattern.words):
             drawings = draw_nest(placed.pieces)
         for drawing in drawings:
             shift = np.column_stack([np.eye(2), placed.offset])
-            hue = drawn.index(drawing.piece.size) if len(placed.pieces) > 1 else None
+            hue = list(garment.pieces).index(drawing.piece.size) if len(placed.pieces) > 1 else None
             page.piece(drawing, shift, hue=hue, seams=seams)
     page.write(path)
 

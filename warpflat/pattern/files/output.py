@@ -710,8 +710,7 @@ def remove_stale(
         names = ", ".join(file for _, file in removed)
         notes.insert(0, f"removed what an earlier run had left and this one did not make: {names}")
     complete = write_report(folder / report, metrics, name=name, files=files, gone=removed)
-    left_out = () if going_on is None else dict.fromkeys(step.note for step in going_on.left_out)
-    return complete, (*left_out, *notes)
+    return complete, (*notes_left_out(folder).get("notes", ()), *notes)
 
 
 def record_file(folder: Path, name: str, file: str) -> None:
