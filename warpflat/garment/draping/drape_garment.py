@@ -81,7 +81,7 @@ def drape(
         cuts[name] = [(words, np.concatenate([path, path * [-1.0, 1.0, 1.0]])) for words, path in paths]
     return Drape(
         cloth=cloth, worn=worn, body=solid, designed=designed, options=options, sources=sources, frames=frames,
-        hangs_below=line_height(mannequin, "hip"), cuts=cuts, threaded=gripped,
+        hangs_below=line_height(wearer if mannequin is None else mannequin, "hip"), cuts=cuts, threaded=gripped,
     )  # fmt: skip
 
 
