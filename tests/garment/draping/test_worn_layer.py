@@ -484,6 +484,28 @@ def test_an_elastic_draws_its_edge_to_the_body_at_its_height_and_holds_it():
         worn(replace(pattern, elastics=()))
 
 
+def test_a_pattern_is_compared_with_where_its_elastic_has_drawn_it():
+    body = body_of_size(30.0)
+    hip = body.levels()["hip"]
+    radius = (hip.girth + 0.1) / (2.0 * np.pi)
+    tube = rectangle("tube", 2.0 * np.pi * radius, 0.15, ("low", "right", "waist", "left"))
+    elastic = Elastic(edge="waist", width=0.03, lengths={"": 0.7})
+    pattern = Pattern(
+        name="x", pieces={"": [tube]}, seams=[joined("side", "tube.left", "tube.right")], elastics=[elastic]
+    )
+
+    def around(points: FloatArray) -> FloatArray:
+        angle = points[:, 0] / radius
+        return np.column_stack([radius * np.sin(angle), hip.height - 0.05 + points[:, 1], radius * np.cos(angle)])
+
+    drape, _ = drape_pattern(
+        pattern, body, fabric=warpflat.find_fabric("woven"), placement=Placement(lifts={"tube": around}, spacing=0.04),
+        options=DrapeOptions(max_steps=1), device=DEVICE,
+    )  # fmt: skip
+    assert drape.compared_with == "designed surface"
+    assert drape.distance[drape.cloth.lines["tube.waist"]].max() < 1e-6
+
+
 def test_a_hood_is_draped_over_a_head(monkeypatch: pytest.MonkeyPatch):
     body = body_of_size(30.0)
     hip, neck = body.levels()["hip"], body.levels()["neck"].height

@@ -165,8 +165,7 @@ def drape_pattern(
     drafted = [name for name in meshes if name not in placed]
     placed = _continued(placed, meshed, body)
     cloth = sew_meshes(meshed, fabric, placed, turned=turned)
-    designed = Body(cloth.designed, cloth.faces, device=where)
-    solid = designed if solid is None else solid
+    solid = Body(cloth.designed, cloth.faces, device=where) if solid is None else solid
     if not lifted or drafted:
         cloth = _sewn_to(cloth, set(meshes) - set(drafted) if lifted else (), solid)
     threaded = sorted({elastic.edge for elastic in pattern.elastics})
@@ -174,9 +173,12 @@ def drape_pattern(
     if gripped:
         notes.append(f"held by an elastic: {', '.join(threaded)}")
     worn, frames = come_to_rest(cloth, solid, [*placement.hold, *gripped], options, callback, body)
+    designed = solid
     if not lifted:
         # What it should lie on is the body below it.
-        cloth, designed = replace(cloth, designed=solid.nearest(worn.positions)[0]), solid
+        cloth = replace(cloth, designed=solid.nearest(worn.positions)[0])
+    elif body is not None:
+        designed = Body(cloth.designed, cloth.faces, device=where)
     return Drape(
         cloth=cloth,
         worn=worn,
