@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from polygons import corners_of, drafted, polygon, sewn
 
 from warpflat.app.cli.main import main
+from warpflat.app.scene.outside_pattern import OutsideJob, RunGirth, drape_outside
 from warpflat.pattern.drafting.drafted import DraftedGarment
 from warpflat.pattern.export.pattern_json import write_pattern_json
 from warpflat.pattern.export.read_svg import read_svg
@@ -47,6 +49,17 @@ def test_a_drawing_is_draped(tube: Path, tmp_path: Path, capsys: pytest.CaptureF
     names |= {"worn.usdc"}
     assert {path.name for path in out.iterdir()} == names
     assert json.loads((out / "metrics.json").read_text())["drape"]["compared_with"] == "body"
+
+
+def test_girths_of_a_run_are_told_of_the_size_that_was_run(tube: Path, tmp_path: Path):
+    table = tmp_path / "worn.toml"
+    table.write_text('spacing_mm = 40\n[mannequin]\nsize = "EU 38"\nresolution_mm = 40.0\n[drape]\nmax_steps = 1\n')
+    job = OutsideJob.read(tube, sewing=table)
+    pieces = {size: [replace(piece, size=size) for piece in job.pattern.pieces[""]] for size in ("M", "L")}
+    pattern = replace(job.pattern, pieces=pieces, sample_size="M")
+    job = replace(job, pattern=pattern, girths={"hip": RunGirth(body_m=0.96, form_m=0.98, pattern_m=1.0)})
+    for size, told in (("M", ["hip"]), ("L", [])):
+        assert list(drape_outside(job, tmp_path / size, size=size).metrics["girths"]) == told
 
 
 @pytest.mark.parametrize(

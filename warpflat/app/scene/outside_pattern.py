@@ -352,13 +352,15 @@ def drape_outside(
     cloth, notes = _fabric(job, fabric)
     cloth = cloth.allowing(shear_limit)
     usd, correct = usd or table.usd, correct or table.correct
+    # Of other sizes the run has neither the designed surface nor the girths.
+    is_sample = size in (None, pattern.sample)
     names = ["metrics.json", *files_of_drape([], picture=True, frames=True, usd=usd)]
     if correct:
         names += ["corrected.png", f"{job.name}.corrected.dxf", f"{job.name}.corrected.svg"]
     with output_folder(out, names, sources=job.sources, guard=True) as folder:
         report_activity("draping")
         with errors_named(str(job.path)):
-            lifts = job.lifts if size in (None, pattern.sample) else {}
+            lifts = job.lifts if is_sample else {}
             placement = Placement(
                 top=job.sewing.top, lifts=lifts, size=size, spacing=1e-3 * job.sewing.spacing_mm, hold=table.hold
             )
@@ -384,7 +386,8 @@ def drape_outside(
             files += written.files
             corrected = [found.describe(), *written.notes]
         files.append("metrics.json")
-        body = {} if job.body is None else {"mannequin": job.body.metrics(), "girths": job.girths_on_body()}
+        girths = job.girths_on_body() if is_sample else {}
+        body = {} if job.body is None else {"mannequin": job.body.metrics(), "girths": girths}
         measured = run_metrics({}, wp.get_device(device), {**body, "drape": entry})
         metrics, stale = remove_stale(folder, measured, name=job.name, files=files, drape=True)
     # A report in few lines tells the first of them.
