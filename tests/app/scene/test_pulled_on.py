@@ -105,11 +105,15 @@ def test_zip_is_a_share_of_its_line_in_whole_centimetres(tmp_path: Path, garment
 
 def test_an_opening_suits_each_size(tmp_path: Path):
     (tmp_path / "x.toml").write_text(
-        'form = "dress"\n[mannequin]\nsize = "EU 38"\nresolution_mm = 40\n[[openings]]\nkind = "zip"\nseam = "centre back"\n'
+        'form = "dress"\n[mannequin]\nsize = "EU 38"\nresolution_mm = 40\n[[openings]]\nkind = "buttons"\nseam = "centre front"\n'
         'length_share = 0.5\n[pattern]\nsizes = ["EU 140"]\n'
     )
     plan = plan_form_scene(load_scene(tmp_path / "x.toml"))
-    assert plan.other_sizes()["EU 140"].openings[0].length_mm < plan.openings[0].length_mm
+    other = plan.other_sizes()["EU 140"]
+    assert other.openings[0].length_mm < plan.openings[0].length_mm
+    # The edges of its stand are straight as far as it reaches.
+    for one in (plan, other):
+        assert {each.reach for each in one.constraints} == {one.openings[0].length}
 
 
 def test_length_share_before_start_is_named(tmp_path: Path):

@@ -371,9 +371,8 @@ class FormScenePlan(Plan):
         for size in self.scene.settings.pattern.sizes:
             if size != self.size:
                 with errors_named(f"{self.scene.where}: pattern.sizes"):
-                    body, form = scene_form(self.scene, scene_mannequin(self.scene, size=size))
-                    openings = _sized_openings(self.scene, form)
-                found[size] = replace(self, mannequin=body, form=form, openings=openings)
+                    built = scene_form(self.scene, scene_mannequin(self.scene, size=size))
+                    found[size] = plan_form_scene(self.scene, device=self.device, built=built)
         return found
 
 
