@@ -140,6 +140,17 @@ def test_a_drape_is_done_without_its_pictures(
     assert Path("out/frames.usdc").stat().st_size > 1000  # how it was flattened
 
 
+def test_a_drape_that_is_not_at_rest_is_kept_without_its_correction(capfd: pytest.CaptureFixture[str]) -> None:
+    Path("dome.toml").write_text(DOME + HELD + "correct = true\nmax_steps = 1\n")
+    assert main(["run", "dome.toml", "--out", "out", "-q"]) == 1
+    told = capfd.readouterr().err
+    assert "the pattern was not corrected: dome.toml: correct: the drape in isotropic is not at rest" in told
+    assert "the drape is not at rest after" in told
+    left = {path.name for path in Path("out").iterdir()}
+    assert {"dome.draped.obj", "dome.dxf", "metrics.json"} < left
+    assert not any("corrected" in name for name in left)
+
+
 def test_a_corrected_pattern_is_cut_from_the_scenes_cloth() -> None:
     cloth = "[cloth]\nshrinkage_warp = 0.2\nlining = 'satin'\n[pattern]\nformats = ['svg']\n"
     bare = DOME.replace("frames = 4", "frames = 0\npicture = false")

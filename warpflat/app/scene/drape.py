@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from warpflat.app.scene.load import Scene, errors_named, fabric_of_correction
 from warpflat.app.scene.schema import DrapeTable
-from warpflat.core import report_activity
+from warpflat.core import StepError, report_activity
 from warpflat.garment import Garment, garment_files
 from warpflat.pattern import pattern_names
 
@@ -68,24 +68,25 @@ def write_drape(
     if table.correct or table.correct_fabric is not None:
         # Correct the pattern, and write it beside the first.
         from warpflat.garment import correct_pattern
-        from warpflat.pattern import optional_file
+        from warpflat.pattern import optional_file, optional_step
 
         report_activity("correcting the pattern")
-        with errors_named(scene.where):
-            other = fabric_of_correction(scene)
-            found = correct_pattern(draped, hold=table.hold, fabric=other, worn_shape=other is not None)
-        if output.picture:
-            with optional_file(folder / "corrected.png", files) as path:
-                from warpflat.garment import write_correction_picture
+        with optional_step("the pattern was not corrected", of=StepError):
+            with errors_named(scene.where):
+                other = fabric_of_correction(scene)
+                found = correct_pattern(draped, hold=table.hold, fabric=other, worn_shape=other is not None)
+            if output.picture:
+                with optional_file(folder / "corrected.png", files) as path:
+                    from warpflat.garment import write_correction_picture
 
-                write_correction_picture(path, found)
-        corrected = found.apply(garment)
-        assert isinstance(corrected, Garment)
-        drawing = replace(drawing, formats=_corrected_formats(scene), cloth=None)
-        written = garment_files({"": corrected}, folder, name=f"{scene.name}.corrected", options=drawing)
-        metrics["drape"]["correction"] = found.measures(garment)
-        files += written.files
-        notes = written.notes
+                    write_correction_picture(path, found)
+            corrected = found.apply(garment)
+            assert isinstance(corrected, Garment)
+            drawing = replace(drawing, formats=_corrected_formats(scene), cloth=None)
+            written = garment_files({"": corrected}, folder, name=f"{scene.name}.corrected", options=drawing)
+            metrics["drape"]["correction"] = found.measures(garment)
+            files += written.files
+            notes = written.notes
     return metrics, files, notes
 
 

@@ -21,8 +21,8 @@ from scipy.sparse import csc_array
 
 from warpflat.core import (
     FloatArray,
-    InputError,
     IntArray,
+    StepError,
     factor_symmetric,
     format_count,
     polyline_length,
@@ -181,8 +181,8 @@ def correct_pattern(
         callback: called with the number of each round and its misfit.
 
     Raises:
-        InputError: the drape is not at rest, or that of another cloth or shape.
-        StepError: another cloth falls off.
+        InputError: an unknown line.
+        StepError: the drape is not at rest, or that of another cloth or shape, or another cloth falls off.
     """
     _check_rest(drape)
     bridging, device = not worn_shape, drape.body.device
@@ -239,7 +239,7 @@ def correct_pattern(
 def _check_rest(drape: Drape) -> None:
     drape.worn.check_held()
     if not drape.converged:
-        raise InputError(f"correct: the drape in {drape.cloth.fabric.name} is not at rest; raise max_steps in [drape]")
+        raise StepError(f"correct: the drape in {drape.cloth.fabric.name} is not at rest; raise max_steps in [drape]")
 
 
 def _round(drape: Drape, share: float, bridging: bool) -> Round:
@@ -260,7 +260,8 @@ def relieve_pattern(drape: Drape, *, hold: Sequence[str] = (), rounds: int = 6) 
         rounds: the most.
 
     Raises:
-        InputError: the drape is not at rest.
+        InputError: an unknown line.
+        StepError: the drape is not at rest.
     """
     _check_rest(drape)
     held, limit = held_vertices(drape.cloth, [*hold, *drape.threaded]), drape.cloth.fabric.strain_limit
