@@ -157,7 +157,7 @@ def test_what_is_done_is_not_done_again(tmp_path: Path):
     run_batch(tasks[:2], out)
     before, seen = files(out), list[tuple[int, int]]()
     rows = run_batch(tasks, out, on_progress=lambda *numbers: seen.append(numbers))
-    assert [row.status for row in rows] == ["at rest"] * 3
+    assert [row.status for row in rows] == ["done"] * 3
     assert seen == [(2, 2), (3, 2)]
     assert {name: files(out)[name] for name in before} == before
     # It is done where `warpflat run` would end with 0.
@@ -168,7 +168,7 @@ def test_what_is_done_is_not_done_again(tmp_path: Path):
         {"left_out": ["it was not sewn"]},
     ):
         write_sealed(metrics, {**read_result(metrics), **fault})
-        assert read_row(tasks[0], out).status == "not at rest"
+        assert read_row(tasks[0], out).status == "with faults"
         write_sealed(metrics, {key: value for key, value in read_result(metrics).items() if key not in fault})
     metrics.unlink()  # half a result is none
     assert read_row(tasks[0], out) is None
@@ -183,20 +183,20 @@ def test_an_interruption_keeps_what_is_done(tmp_path: Path):
     with pytest.raises(KeyboardInterrupt):
         run_batch(tasks, out, on_progress=stop)
     with (out / "index.csv").open(newline="") as file:
-        assert [row["status"] for row in csv.DictReader(file)] == ["at rest", "at rest", "to do"]
+        assert [row["status"] for row in csv.DictReader(file)] == ["done", "done", "to do"]
 
 
 def test_an_error_is_a_result(tmp_path: Path):
     path, out = write(tmp_path, FABRICS.replace("denim", "<b>tweed")), tmp_path / "out"
     done = CliRunner().invoke(batch, [str(path), "--out", str(out)], standalone_mode=False)
     assert done.return_value == 1
-    assert "2 at rest, 1 error" in done.output
+    assert "2 done, 1 error" in done.output
     tasks = load_batch(path)
     error = out / f"{tasks[1].key}.error.json"
     assert "unknown fabric" in json.loads(error.read_text())["message"]
     assert not (out / tasks[1].key).exists()
     written = error.stat().st_mtime_ns
-    assert [row.status for row in run_batch(tasks, out)] == ["at rest", "error", "at rest"]
+    assert [row.status for row in run_batch(tasks, out)] == ["done", "error", "done"]
     assert error.stat().st_mtime_ns == written
     page = (out / "index.html").read_text()
     assert page.count("<tr>") == 4
@@ -216,7 +216,7 @@ def test_a_task_that_killed_its_process_three_times_is_set_aside(tmp_path: Path)
     (tmp_path / f"{task.key}.started").write_text("here 1\nhere 2\nhere 3\n")
     (tmp_path / f"{other.key}.started").write_text("here 1\nhere 2\n")
     rows = run_batch([task, other], tmp_path)
-    assert [row.status for row in rows] == ["set aside", "at rest"]
+    assert [row.status for row in rows] == ["set aside", "done"]
     assert "killed 3 times" in rows[0].message
     assert not list(tmp_path.glob("*.started"))
 
@@ -228,7 +228,7 @@ def body_pattern(name: str, girths: tuple[float, float, float], *, is_size: bool
     task = Task(key=name, name="b", scene="b.toml", body=name, fabric="woven", override="", data={}, where="")
     bust, waist, hip = girths
     return BodyPattern(
-        row=Row(task=task, status="at rest"),
+        row=Row(task=task, status="done"),
         is_size=is_size,
         girths={"bust": bust, "waist": waist, "hip": hip},
         measures={"area": 0.5 * bust, "side_seam": 0.2},
@@ -332,11 +332,11 @@ def test_a_killed_worker_costs_nothing_but_time(tmp_path: Path):
     text = FABRICS.replace('"jersey"', '"jersey", "interlock"')
     tasks = plan(tmp_path, text)
     rows = run_batch(tasks, tmp_path / "out", workers=2, on_progress=kill_one)
-    assert [row.status for row in rows] == ["at rest"] * 4
+    assert [row.status for row in rows] == ["done"] * 4
     # By a worker, too: the noise of --rounding does not reach it.
     (tmp_path / "whole").mkdir()
     whole = importlib.import_module("warpflat.app.batch.workers").run_on_workers(tasks[:1], tmp_path / "whole", 1)
-    assert [row.status for row in whole] == ["at rest"]
+    assert [row.status for row in whole] == ["done"]
     assert contents(tmp_path / "out" / tasks[0].key) == contents(tmp_path / "whole" / tasks[0].key)
 
 

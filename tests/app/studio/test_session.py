@@ -238,6 +238,9 @@ def test_saving_writes_a_new_scene_and_runs_it_from_scratch(tmp_path: Path) -> N
     assert (saved.folder / "metrics.json").is_file()
     assert session.solution is not None
     assert saved.strain_energy == pytest.approx(session.solution.strain_energy, rel=5e-3)
+    assert ", done<" in _head(session)
+    session.saved = replace(saved, metrics={**saved.metrics, "left_out": ["the hem was left out"]})
+    assert ", NOT done<" in _head(session)
     text = saved.path.read_text()
     session.change("cloth", fabric="silk")
     session.save(name)

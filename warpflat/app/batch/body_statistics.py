@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.app.batch.task import AT_REST, NOT_AT_REST, Row
+from warpflat.app.batch.task import DONE, WITH_FAULTS, Row
 from warpflat.core import read_result
 from warpflat.pattern import has_seal
 
@@ -108,7 +108,7 @@ def read_body_patterns(rows: Sequence[Row], out: Path) -> list[BodyPattern]:
         out: its folder.
     """
     patterns = list[BodyPattern]()
-    for row in (row for row in rows if row.status in (AT_REST, NOT_AT_REST)):
+    for row in (row for row in rows if row.status in (DONE, WITH_FAULTS)):
         try:
             metrics = read_result(out / row.task.key / "metrics.json")
             if not has_seal(metrics):

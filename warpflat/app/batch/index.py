@@ -12,7 +12,7 @@ from pathlib import Path
 
 from warpflat._version import __version__
 from warpflat.app.batch.plan import Task
-from warpflat.app.batch.task import AT_REST, ERROR, NOT_AT_REST, SET_ASIDE, TO_DO, Row
+from warpflat.app.batch.task import DONE, ERROR, SET_ASIDE, TO_DO, WITH_FAULTS, Row
 from warpflat.pattern import atomic_path, output_folder, write_report
 
 __all__ = ["BatchIndex"]
@@ -21,7 +21,7 @@ __all__ = ["BatchIndex"]
 _EVERY = 2.0
 _FITS = {None: "", True: "yes", False: "no"}
 _NAMES = ("scene", "body", "fabric", "override")
-_COLOURS = {AT_REST: "good", NOT_AT_REST: "bad", ERROR: "bad", SET_ASIDE: "bad"}
+_COLOURS = {DONE: "good", WITH_FAULTS: "bad", ERROR: "bad", SET_ASIDE: "bad"}
 _STYLE = """
 main { max-width: none; } td, th { vertical-align: middle; } th { cursor: pointer; user-select: none; }
 th.text { text-align: left; } th:hover { color: var(--ink); } th[aria-sort=ascending]::after { content: " ↑"; }

@@ -20,10 +20,11 @@ from warpflat.core import InputError, is_number, one_line, open_file, read_resul
 from warpflat.pattern import NotOursError, output_folder, refuse_to_replace_others, remove_unfinished, write_sealed
 
 __all__ = [
+    "DONE",
     "ERROR",
-    "NOT_AT_REST",
     "SET_ASIDE",
     "TO_DO",
+    "WITH_FAULTS",
     "Row",
     "error_file",
     "forget_starts",
@@ -33,7 +34,7 @@ __all__ = [
     "set_aside",
 ]
 
-TO_DO, AT_REST, NOT_AT_REST, ERROR, SET_ASIDE = "to do", "at rest", "not at rest", "error", "set aside"
+TO_DO, DONE, WITH_FAULTS, ERROR, SET_ASIDE = "to do", "done", "with faults", "error", "set aside"
 
 # A task is set aside when it has killed its process so many times.
 _MOST_KILLS = 3
@@ -187,7 +188,7 @@ def read_row(task: Task, out: Path) -> Row | None:
             raise ValueError(fits)
         return Row(
             task=task,
-            status=AT_REST if is_done(metrics) else NOT_AT_REST,
+            status=DONE if is_done(metrics) else WITH_FAULTS,
             strain_energy_j=sum(_number(piece["strain_energy_j"]) for piece in pieces),
             fits=fits,
             girths_m={

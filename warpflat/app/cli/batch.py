@@ -42,7 +42,7 @@ def batch(file: Path, out: Path | None, workers: int, scheduler: str | None, qui
     """Run many scenes: bodies, fabrics and overrides of a batch file.
 
     A task whose result is there is not run again. Ctrl-C keeps what is done, and the same command goes on from there.
-    A task that fails ends none of the others; the exit code is 1 then, and where a task is not at rest.
+    A task that fails ends none of the others; the exit code is 1 then, and where one ends with faults, as its run would.
 
     Several workers and a scheduler need Dask: pip install ".[batch]" in a checkout.
 
@@ -53,7 +53,7 @@ def batch(file: Path, out: Path | None, workers: int, scheduler: str | None, qui
     """
     from warpflat.app.batch.plan import load_batch
     from warpflat.app.batch.run import run_batch
-    from warpflat.app.batch.task import NOT_AT_REST
+    from warpflat.app.batch.task import WITH_FAULTS
     from warpflat.app.cli.run import start_warp_silently
     from warpflat.core import InputError, one_line
 
@@ -84,7 +84,7 @@ def batch(file: Path, out: Path | None, workers: int, scheduler: str | None, qui
     if not quiet:
         totals = ", ".join(f"{count} {status}" for status, count in counts.items())
         click.echo(f"{len(rows)} tasks: {totals}; see {folder / 'index.html'}")
-    return FAULTY if failed or NOT_AT_REST in counts else DONE
+    return FAULTY if failed or WITH_FAULTS in counts else DONE
 
 
 class _Bar:

@@ -236,7 +236,7 @@ def _head(session: Session) -> str:
     if session.note:
         lines.append(f"<span style='color:#146c2e'>{escape(session.note)}</span>")
     if session.saved is not None and session.note:
-        state = "at rest" if session.saved.at_rest else "NOT at rest"
+        state = "done" if session.saved.is_done else "NOT done"
         lines.append(f"run from scratch: strain energy <b>{energy_words(session.saved.strain_energy)}</b>, {state}")
     if session.saved is not None:
         # What was saved last is there to print, to review and to download.

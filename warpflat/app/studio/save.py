@@ -41,7 +41,7 @@ class Saved:
         return sum(float(piece["strain_energy_j"]) for piece in self.metrics["pieces"].values())
 
     @property
-    def at_rest(self) -> bool:
+    def is_done(self) -> bool:
         """Whether the run is without faults."""
         return is_done(self.metrics)
 
