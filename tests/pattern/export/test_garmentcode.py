@@ -448,6 +448,20 @@ def test_panels_hang_where_the_body_is():
         assert middle(f"{name}_f")[2] > middle(f"{name}_b")[2] + 0.05
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_piece_hangs_before_the_one_that_it_is_sewn_to_beside_another(turned: bool):
+    """A band along two pieces, of which nobody has said where they hang."""
+    long, short = [(0.0, 0.0), (0.4, 0.0), (0.4, 0.1), (0.0, 0.1)], [(0.0, 0.0), (0.2, 0.0), (0.2, 0.1), (0.0, 0.1)]
+    placed = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.9], [0.0, 0.0, 0.2]])
+    pieces = [piece_of("band", long, placement=placed), piece_of("one", short), piece_of("other", short)]
+    sides = side_of("band.e1", reversed=False), side_of("other.e3 + one.e3", reversed=True)
+    seam = Seam(name="band", sides=sides[::-1] if turned else sides)
+    written, _ = garmentcode_json(draft_garment(Pattern(name="p", pieces={"": pieces}, seams=[seam])))
+    heights = {name: panel["translation"][2] for name, panel in written["pattern"]["panels"].items()}
+    assert heights["one"] == pytest.approx(heights["other"])
+    assert heights["one"] > heights["band"]
+
+
 @needs_data
 @pytest.mark.parametrize(("name", "seams", "darts"), [("dress_pencil", 15, 4), ("shirt_mean", 16, 0)])
 def test_patterns_of_garmentcode_are_drafted(name: str, seams: int, darts: int):

@@ -359,7 +359,8 @@ def _places(
             (other.piece, lines[other.piece, other.edge].mean(axis=0)),
         )
         for seam in seams
-        for one, other in zip(seam.sides[0], seam.sides[1], strict=False)
+        for k in range(max(map(len, seam.sides)))
+        for one, other in [[side[min(k, len(side) - 1)] for side in seam.sides]]
     ]
     joined += [(other, one) for one, other in joined]
     for _ in pieces:
