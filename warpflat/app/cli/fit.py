@@ -17,7 +17,6 @@ from warpflat.app.cli.options import (
     output_options,
     scene_option,
     scene_options,
-    tell,
 )
 from warpflat.app.cli.run import report_run, start_warp_silently
 from warpflat.app.scene.plain_names import with_plain_letters
@@ -151,9 +150,7 @@ def fit(
             if keeps_pattern(job, tables)
             else []
         )
-        output.tell_notes([*job.notes, *kept] if one is carried[0] else ())
-        for note in one.notes:
-            tell(f"note: {note}")
+        output.tell_notes([*([*job.notes, *kept] if one is carried[0] else ()), *one.notes])
         if len(bodies) > 1 and output.tells:
             click.echo(f"{one.body}:")
         # Of JSON only that of all bodies is printed.
