@@ -28,7 +28,7 @@ __all__ = ["fit"]
 _ANEW = "--seams auto finds new seams, --seams uv flattens its pieces anew"
 _FILES = """\b
   NAME.fitted.obj  the garment on the other body [m], with the islands, groups and materials of its file
-  NAME.body.obj    that body, standing as the first one does [m]
+  NAME.body.obj    that body, standing as the first one does, or with --keep-pose as its scan is posed [m]
   fit.json         ease by level before and after, of every body
   fit.csv          the same as a table, of several bodies, each of which has a folder in DIR"""
 
