@@ -47,3 +47,7 @@ def test_a_contact_that_costs_less_than_the_share_gets_none(strip: Flattening):
     assert contact_note(replace(strip, options=replace(strip.options, contact_share=1e6))) is None
     flat = replace(strip, stages=strip.stages[:-1])
     assert contact_note(flat) is None
+    # Nor does one that is not to be felt, of a piece that lies flat almost without energy.
+    *begun, free, parted = strip.stages
+    light = replace(free, model_energy_j=1e-12), replace(parted, model_energy_j=1e-9)
+    assert contact_note(replace(strip, stages=(*begun, *light))) is None

@@ -17,6 +17,7 @@ from warpflat.flat.cutting.cut_piece import cut
 from warpflat.flat.cutting.cut_plan import CutPlan
 from warpflat.flat.cutting.ledger import evaluate
 from warpflat.flat.flattening.fit_report import Remedy
+from warpflat.flat.flattening.keep_apart import costs_much
 from warpflat.flat.flattening.progress import CONTACT
 from warpflat.flat.flattening.result import Flattening
 from warpflat.flat.model.fit import WornFit
@@ -105,8 +106,7 @@ def contact_note(result: Flattening) -> str | None:
     last = result.stages[-1]
     if last.name != CONTACT or len(result.stages) < 2:
         return None
-    free = result.stages[-2].model_energy_j
-    if result.contact_energy <= result.options.contact_share * free:
+    if not costs_much(result.network, result.options, result.stages[-2].model_energy_j, last.model_energy_j):
         return None
     path = cut_between_contacts(result)
     piece = result.unsewn or result

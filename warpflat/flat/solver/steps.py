@@ -323,16 +323,10 @@ class Relaxation:
 
     # --- convergence
 
-    def energy_of_strain(self, strain: float) -> float:
-        """Return the energy that the springs store if each is strained by so much [J]."""
-        springs = self.network.spring_arrays
-        # Each spring is listed twice.
-        return 0.25 * strain**2 * dot(springs.listed_stiffness * springs.listed_length, springs.listed_length)
-
     @cached_property
     def negligible_energy(self) -> float:
         """The energy under the least strain everywhere [J]."""
-        return self.energy_of_strain(self.least_strain)
+        return self.network.spring_arrays.energy_of_strain(self.least_strain)
 
     def is_free_of_strain(self, potential: float) -> bool:
         """Return whether an energy of the cloth [J] is negligible, seams included: forces left are rounding errors."""
