@@ -46,12 +46,10 @@ def advise(result: Flattening) -> Flattening:
     wearing was asked for, each of them is made and relaxed on trial, and those that help are kept. A note names the cut that would spare
     the piece a contact that costs much.
     """
-    notes = [note for note in result.notes if not note.startswith(_CONTACT_COSTS)]
-    note = contact_note(result)
-    if note is not None:
-        notes.append(note)
-    if tuple(notes) != result.notes:
-        result = replace(result, notes=tuple(notes))
+    costs = tuple(filter(None, [contact_note(result)]))
+    notes = (*(note for note in result.notes if not note.startswith(_CONTACT_COSTS)), *costs)
+    if notes != result.notes:
+        result = replace(result, notes=notes, relaxation_notes=(*result.relaxation_notes, *costs))
     found = remedies(result, result.fit, trial=result.wear is not None)
     return result.with_remedies(found) if found or result.remedies else result
 

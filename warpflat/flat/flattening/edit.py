@@ -240,6 +240,7 @@ def _continue(result: Flattening, task: RelaxationTask, positions: FloatArray) -
         history=np.concatenate([result.history.reshape(-1, 4), np.array(task.history).reshape(-1, 4)]),
         # They were found for what it was.
         remedies=(),
-        notes=(*result.notes, *(note for note in task.notes if note not in result.notes)),
+        notes=(*(note for note in result.notes if note not in result.relaxation_notes), *task.notes),
+        relaxation_notes=tuple(task.notes),
         options=task.options,
     )
