@@ -377,6 +377,8 @@ def test_remedies_go_with_what_they_were_for():
     advised = warpflat.advise(warpflat.flatten(make_shape("bodice", resolution=13), fabric="woven"))
     assert advised.remedies
     assert warpflat.advise(advised).notes == advised.notes
+    parted = replace(cut(advised, "centre"), remedies=advised.remedies)
+    assert all(part.remedies == () for part in separate(parted))
     looser = warpflat.change_fabric(advised, "jersey")
     assert looser.fit.within_limits
     assert looser.remedies == warpflat.advise(looser).remedies == ()
