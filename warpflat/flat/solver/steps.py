@@ -98,13 +98,12 @@ class Relaxation:
         *,
         start: FloatArray,
         alignments: Sequence[GrainAlignment] = (),
-        least_strain: float = 1e-9,
     ) -> None:
         """Place a network at rest in a layout (#V by 2 [m])."""
         n, f, device = network.vertex_count, network.face_count, network.device
         if np.shape(start) != (n, 2):
             raise InputError(f"start layout has shape {np.shape(start)}; must be ({n}, 2), a point per vertex")
-        self.network, self.options, self.alignments, self.least_strain = network, options, alignments, least_strain
+        self.network, self.options, self.alignments, self.least_strain = network, options, alignments, 1e-9
         self.time_step = options.time_step
         self.position = wp.array(np.ascontiguousarray(start), dtype=wp.vec2d, device=device)
         self.velocity, self.force, self.load, anchor, first_guess = (
