@@ -202,6 +202,10 @@ def test_scene_mistakes_are_named(data: dict[str, object], words: str) -> None:
         ({"like": "skirt", "profiles": {"neck": {"scale": 2}}}, "cannot be adjusted"),
         ({"like": "skirt", "profiles": {"knee": {"like": "biceps"}}}, "level of the same part"),
         ({"like": "skirt", "profiles": {"knee": {"raise_cm": 40}}}, "less than 1 cm above"),
+        (
+            {"like": "trousers", "profiles": {"leg_knee": {"raise_cm": 40}}},
+            "leg_thigh comes to lie less than 1 cm above leg_knee",
+        ),
         ({"like": "skirt", "ruled": [["hip", "neck"]]}, "ruled"),
         ({"pieces": {"a": {"bricks": ["waist-hip/*"]}}}, "not one disk"),
         (

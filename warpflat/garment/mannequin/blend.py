@@ -126,9 +126,7 @@ def adjusted_vertices(
         float(vertices[layout.rings[r[0]], 1].mean() + m[:, 1].mean())
         for r, m in zip(rows[:, None], moves, strict=True)
     ]
-    for (low, h0), (high, h1) in itertools.pairwise(zip(RING_LEVELS, heights, strict=True)):
-        if h1 - h0 < 0.01:
-            raise InputError(f"form: profile {high} comes to lie less than 1 cm above {low}; lower raise_cm")
+    _check_order(RING_LEVELS, heights)
     between = np.arange(rows[0], rows[-1] + 1)
     ids = layout.rings[between]
     # Against height, not row number: the spacing of rows changes from one band to the next.
@@ -149,6 +147,13 @@ def adjusted_vertices(
     share = np.linspace(1.0, 0.0, len(layout.neck))[:, None, None]
     out[layout.neck] = vertices[layout.neck] + share * (out[layout.neck[0]] - vertices[layout.neck[0]])
     return out
+
+
+def _check_order(levels: Sequence[str], heights: Sequence[float]) -> None:
+    """Raise InputError unless each of some levels lies above the one before it."""
+    for (low, h0), (high, h1) in itertools.pairwise(zip(levels, heights, strict=True)):
+        if h1 - h0 < 0.01:
+            raise InputError(f"form: profile {high} comes to lie less than 1 cm above {low}; lower raise_cm")
 
 
 def _changed(row: FloatArray, other: FloatArray | None, change: Adjustment, ease_cm: float) -> FloatArray:
@@ -337,6 +342,7 @@ def _move_legs(
         rows = np.array([layout.leg_row[level] for level in LEG_LEVELS[1:]])
         between = np.arange(rows[0], rows[-1] + 1)
         out[grid[between]] = body[grid[between]] + PchipInterpolator(rows, np.stack(moves), axis=0)(between)
+        _check_order(LEG_LEVELS[:0:-1], [float(out[grid[row], 1].mean()) for row in rows[::-1]])
     move = out - body
     fill_fork(move, layout)
 
