@@ -248,6 +248,14 @@ def test_completion_agrees_with_the_table() -> None:
     assert all(made[name] == pytest.approx(of_size[name], abs=2e-5) for name in made)
 
 
+@pytest.mark.parametrize("stature", [1.58, 1.66])
+def test_what_a_size_lacks_is_completed_as_for_a_typed_body(stature: float) -> None:
+    of_size = measurements_from_size(f"JIS 5AR/{100 * stature:g}")
+    made = measurements_from_values(bust=0.77, hip=0.87, stature=stature)
+    assert of_size.lengths == pytest.approx(made.lengths)
+    assert of_size.heights == pytest.approx(made.heights)
+
+
 def test_lengths_down_the_body_go_with_stature() -> None:
     tall, usual = (measurements_from_values(bust=0.84, **at) for at in ({"stature": 1.85}, {}))
     for name in ("nape_to_waist", "armscye_depth"):
