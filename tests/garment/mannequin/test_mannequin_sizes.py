@@ -265,6 +265,12 @@ def test_lengths_down_the_body_go_with_stature() -> None:
     assert measurements_from_size("EU 36/185").heights == tall.heights
     given = measurements_from_values(bust=0.84, stature=1.85, nape_to_waist=0.43)
     assert given.lengths["nape_to_waist"] == 0.43
+    # A child's bones are those of its stature, its girths those of its size.
+    child, own, taller = (measurements_from_size(size) for size in ("EU 104/110", "EU 104", "EU 110"))
+    for name in ("shoulder", "nape_to_waist", "arm_length", "inside_leg"):
+        assert child.lengths[name] == pytest.approx(taller.lengths[name])
+    assert child.lengths["bust"] == own.lengths["bust"]
+    assert measurements_from_size("EU 104", stature=1.1, inside_leg=0.45).lengths["inside_leg"] == 0.45
     # Men's tables say what changes with stature, for what is completed too.
     men = measurements_from_values(table="men", bust=1.0, stature=1.88)
     assert men.lengths == pytest.approx(measurements_from_size("men 50/188").lengths)

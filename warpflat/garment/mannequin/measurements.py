@@ -255,12 +255,14 @@ class _Completion:
         of_size = of_size or {}
         moved = {name: set(given) if name in of_size else {*given, *of_size} for name in rules}
         self._between = {n for n, rule in rules.items() if set(rule.get("between", ())) & moved[n]} - set(given)
+        # Nor must a child's bones where its size has them when it is as tall as another one's.
+        bones = set(self._rows.get("by_stature", ())) if "stature" in given else set[str]()
         for name, value in of_size.items():
             if name in given:
                 self._notes.append(
                     f"{name} = {given[name] * 100:.1f} cm instead of the {value * 100:.1f} cm of {title}"
                 )
-            elif name not in self._between:
+            elif name not in self._between | bones:
                 self._lengths[name] = self._at_stature(name, value, self._own)
         if of_size:
             self._known = set(self._lengths)
