@@ -390,6 +390,15 @@ def test_what_a_profile_cannot_do_is_refused(level: str, change: dict[str, Any])
         adjusted_vertices(body.layout, body.vertices, {level: Adjustment(**change)})
 
 
+def test_an_armhole_moves_with_its_own_side_of_the_trunk_whichever_side_that_is() -> None:
+    layout, lean = body_of_size(30.0).layout, body_of_size(30.0).vertices.copy()
+    lean[layout.rings[layout.level_row["waist"]], 0] += 0.04
+    flip = np.array([-1.0, 1.0, 1.0])
+    like_waist = {"bust": Adjustment(like="waist")}
+    left, right = (adjusted_vertices(layout, each, like_waist) for each in (lean, lean[layout.mirror] * flip))
+    assert left == pytest.approx(right[layout.mirror] * flip, abs=1e-6)
+
+
 def test_a_dart_of_another_piece_does_not_stand_for_one_that_a_seam_takes_over() -> None:
     layout, vertices = body_of_size(30.0).layout, body_of_size(30.0).vertices
     recipes = {"bodice": ("shoulder-waist/front-*",), "skirt": ("waist-knee/front-*",)}

@@ -247,7 +247,8 @@ def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: tuple[
             normals = unit(np.column_stack([-tangent[:, 2], np.zeros(len(row)), tangent[:, 0]]))
             move[row] = distance * normals + (chest[0].scale - 1.0) * (body[row] - body[row].mean(axis=0))
             held[local[row]] = True
-    fill_sheet(move, layout, ids, laplacian[~held], np.flatnonzero(~held))
+    free = np.flatnonzero(~held)
+    fill_sheet(move, layout, ids, laplacian[free], free)
     normals = vertex_normals(body, layout.faces)
     reach, side_reach = layout.columns[3] + len(layout.front) // 2, layout.quarter - layout.to_princess
     around, beside = np.arange(-reach, reach + 1), np.arange(-side_reach + 1, side_reach)
@@ -256,7 +257,7 @@ def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: tuple[
         of_trunk = unit(normals[at_bust] * [1.0, 0.0, 1.0])
         outward = float(move[at_bust] @ of_trunk)
         if outward <= 0.0:
-            break
+            continue
         # Beyond the rounded web of the armpit.
         bisector = unit(of_trunk + normals[layout.arms[side][layout.arm_row["biceps"] // 2, 0]])
         wished = outward / max(float(bisector @ of_trunk), _LEAST_MITRE) * bisector
@@ -271,7 +272,7 @@ def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: tuple[
         rows = layout.rings[first : bust + 1, (column + beside) % layout.rings.shape[1]]
         move[rows, 1] += float(more[1]) * share * smoothstep(1.0 - np.abs(beside) / side_reach)
         held[local[loop]] = True
-    else:
+    if held[free].any():
         fill_sheet(move, layout, ids, laplacian[~held], np.flatnonzero(~held))
     out[ids] = body[ids] + move[ids]
     out[layout.rings[: bust + 1]] = (body + move)[layout.rings[: bust + 1]]
