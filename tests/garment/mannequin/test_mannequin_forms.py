@@ -390,6 +390,12 @@ def test_what_a_profile_cannot_do_is_refused(level: str, change: dict[str, Any])
         adjusted_vertices(body.layout, body.vertices, {level: Adjustment(**change)})
 
 
+def test_numbers_of_numpy_are_numbers_in_every_table() -> None:
+    data = {"like": "tshirt", "ease": {"hip": np.int64(4)}, "profiles": {"hip": {"offset_cm": np.int64(1)}}}
+    form = form_from_mapping("mine", data)
+    assert (form.ease["hip"], form.profiles["hip"].offset_cm) == (4.0, 1.0)
+
+
 def test_an_armhole_moves_with_its_own_side_of_the_trunk_whichever_side_that_is() -> None:
     layout, lean = body_of_size(30.0).layout, body_of_size(30.0).vertices.copy()
     lean[layout.rings[layout.level_row["waist"]], 0] += 0.04
