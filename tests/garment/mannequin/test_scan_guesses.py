@@ -100,6 +100,25 @@ def test_trunk_of_two_equal_parts_has_a_direction() -> None:
 
 
 @needs_data
+def test_tapes_over_holes_in_chest_and_upper_arm_are_guesses() -> None:
+    points, faces = scan("female")
+    whole = scanned_body("female")
+    x, y, z = points[faces[:, :3]].mean(axis=1).T
+    elbow, upper = (whole.line(f"{name} left").mean(axis=0) for name in ("elbow", "biceps"))
+    share = (whole.measures["biceps left"].height - elbow[1]) / (upper - elbow)[1]
+    arm = elbow + share * (upper - elbow)
+    in_arm = (np.linalg.norm(np.stack([x, y, z], axis=1) - arm, axis=1) < 0.06) & (x > arm[0] - 0.01)
+    in_chest = (np.abs(y - whole.measures["chest, fullest"].height) < 0.03) & (np.abs(x) < 0.07) & (z > 0.0)
+    body = Mannequin.from_scan(points, faces[~(in_arm | in_chest)], resolution_mm=40.0)
+    for name, why in (("biceps left", "does not show the body"), ("chest, fullest", "over a hole in the scan")):
+        guess = body.measures[name].guess
+        assert whole.measures[name].guess is None
+        assert guess is not None
+        assert why in guess
+    assert body.measures["biceps right"].guess is None
+
+
+@needs_data
 def test_tapes_of_arms_above_the_shoulders_are_guesses() -> None:
     """The shoulder's flesh comes into them: a tape laid on the mesh is 60 to 110 mm off."""
     up, level = posed_body("female", "arms up"), posed_body("female", "arms level")
