@@ -9,11 +9,12 @@ from body_tapes import armpit_and_crotch
 from landmarks import Landmarks
 from limb_tapes import arm_tapes, tape_across
 from real_files import needs_data
-from scans import posed_body, posed_scan, scan, scanned_body, triangles_of
+from scans import _read, posed_body, posed_scan, scan, scanned_body, triangles_of
 
 from warpflat.core.errors import InputError
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation
 from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.garment.mannequin.scan_levels import find_levels
 from warpflat.garment.mannequin.scan_pose import across_trunk
 from warpflat.garment.mannequin.slicer import Slicer
 
@@ -97,6 +98,15 @@ def test_trunk_of_two_equal_parts_has_a_direction() -> None:
     left = across_trunk(slicer, np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0]))
     assert abs(left[1]) < 1e-9
     assert np.linalg.norm(left) == pytest.approx(1.0)
+
+
+@needs_data
+@pytest.mark.parametrize(("name", "words"), [("calf", "knee .* above calf"), ("ankle", "calf .* above ankle")])
+def test_levels_of_the_leg_come_in_their_order(name: str, words: str) -> None:
+    read = _read("female")
+    above = {"calf": "knee", "ankle": "calf"}[name]
+    with pytest.raises(InputError, match=words):
+        find_levels(read.body, read.laid, 0.0, {name: read.found[f"leg_{above}"].height + 0.005})
 
 
 @needs_data
