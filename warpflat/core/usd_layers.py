@@ -32,7 +32,7 @@ def check_layers(path: Path) -> None:
     from pxr import Ar, Sdf, Tf
 
     folder, total = os.path.realpath(path.parent), path.stat().st_size
-    todo, seen = list[Any](), {str(path)}
+    todo, seen, files = list[Any](), {str(path)}, {os.path.realpath(path)}
     # Whoever opens the file itself says what is wrong with it.
     with suppress(Tf.ErrorException):
         todo = list(filter(None, [Sdf.Layer.FindOrOpen(str(path))]))
@@ -52,7 +52,7 @@ def check_layers(path: Path) -> None:
             if asset.startswith("`"):
                 raise InputError(f"{where}, which is an expression; {_FLATTEN}")
             full = Sdf.ComputeAssetPathRelativeToLayer(layer, asset)
-            file, within = Ar.SplitPackageRelativePathOuter(full) if Ar.IsPackageRelativePath(full) else (full, "")
+            file = Ar.SplitPackageRelativePathOuter(full)[0] if Ar.IsPackageRelativePath(full) else full
             # What is not beside the layer would be looked for elsewhere.
             file = os.path.realpath(os.path.join(os.path.dirname(layer.realPath), file))
             if full in seen:
@@ -60,13 +60,16 @@ def check_layers(path: Path) -> None:
             seen.add(full)
             if os.path.commonpath([folder, file]) != folder:
                 raise InputError(f"{where}, which lies outside its folder; put all parts beside it, or {_FLATTEN}")
+            # Of a package each layer is a part, but it is one file.
+            new = file not in files
+            files.add(file)
             try:
-                check_regular(Path(file), FORMATS["mesh"].most - total)
+                check_regular(Path(file), FORMATS["mesh"].most - new * total)
             except FileNotFoundError:
                 raise InputError(f"{where}, which is missing; put all parts beside it, or {_FLATTEN}") from None
             except InputError as error:
                 raise InputError(f"{where}, which {error}") from None
-            total += 0 if within else os.path.getsize(file)
+            total += new * os.path.getsize(file)
             allow_size(total)
             found = None
             with suppress(Tf.ErrorException):

@@ -414,7 +414,7 @@ def test_help_teaches(command: Command, name: list[str]):
         ("run", "metrics.json", "out/NAME"),
         ("flatten", "metrics.json", "out/NAME"),
         ("compare", "compare.json", "out/NAME-compared"),
-        ("cuts", "ledger.json, with --apply metrics.json,", "out/NAME"),
+        ("cuts", "ledger.json, with --apply metrics.json, of an edited dart edit.json,", "out/NAME"),
     ],
 )
 def test_help_says_what_is_printed_and_where_files_go(command: Command, name: str, printed: str, folder: str):

@@ -87,6 +87,19 @@ def test_edges_are_listed(tube: Path, capsys: pytest.CaptureFixture[str]):
     assert lines[0].startswith("front.e1: 500.0 mm, seam, from (")
 
 
+def test_quiet_keeps_the_edges_and_leaves_out_the_notes(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    drawing = tmp_path / "drawing.svg"
+    drawing.write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" width="500mm" height="400mm" viewBox="0 0 500 400">'
+        '<path id="a" d="M20 20 H180 V380 H20 Z"/><path id="b" d="M300 20 H480 V380 H300"/></svg>'
+    )
+    assert main(["drape", str(drawing), "--edges"]) == 0
+    told = capsys.readouterr()
+    assert "note: 1 open line was left out: 'b'" in told.err
+    assert main(["drape", str(drawing), "--edges", "--quiet"]) == 0
+    assert capsys.readouterr() == (told.out, "")
+
+
 def test_json_of_a_form_is_all_that_is_printed(tmp_path: Path):
     scene = tmp_path / "skirt.toml"
     scene.write_text(

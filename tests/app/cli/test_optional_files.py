@@ -148,6 +148,19 @@ def test_a_corrected_pattern_is_cut_from_the_scenes_cloth() -> None:
     assert all("satin" in Path("out", f"{name}.svg").read_text() for name in ("dome", "dome.corrected"))
 
 
+def test_a_pattern_of_thousands_of_sheets_is_done_without_its_pages(capfd: pytest.CaptureFixture[str]) -> None:
+    Path("dome.toml").write_text(
+        "[surface]\nshape = 'dome'\nsize = 9.9\nradius = 20\nresolution = 9\n[output]\nframes = 0\npicture = false\n"
+    )
+    assert main(["run", "dome.toml", "--out", "out", "-q"]) == 0
+    metrics = json.loads(Path("out/metrics.json").read_text())
+    (note,) = metrics["notes"]
+    assert note.startswith("pattern.pdf was left out: it would take some ")
+    assert "left_out" not in metrics
+    assert f"warpflat: note: out: {note}\n" == capfd.readouterr().err
+    assert not Path("out/pattern.pdf").exists()
+
+
 @pytest.mark.parametrize(
     "place",
     [

@@ -144,6 +144,15 @@ def test_several_bodies_are_a_study_with_asked_ease(command: Command):
         assert Path("study", folder, "pattern.json").is_file()
 
 
+def test_quiet_keeps_the_notes_on_a_body_to_its_file(command: Command):
+    _skirt(Path("skirt.obj"), texture=False)
+    narrow = ("fit", "skirt.obj", "--units", "m", *ON, "--to", "EU 36", "--ease", "hip=-10cm", "--out", "narrow", *BARE)
+    ended = command(*narrow)
+    (entry,) = json.loads(Path("narrow/fit.json").read_text(encoding="utf-8"))["bodies"]
+    assert any("of the cloth lies within EU 36" in note for note in entry["notes"])
+    assert "note: " not in ended.err
+
+
 def test_scans_of_one_name_are_told_apart_and_none_is_replaced(command: Command):
     model = BodyModel.load()
     person = mean_person(model)

@@ -20,9 +20,10 @@ from warpflat.flat.cutting.candidates import find_candidates, find_peaks
 from warpflat.flat.cutting.cut_piece import cut
 from warpflat.flat.cutting.cut_plan import CutPlan, line_part
 from warpflat.flat.cutting.dart_move import move_dart
-from warpflat.flat.cutting.ledger import make_ledger
+from warpflat.flat.cutting.ledger import LEAST_MOUTH, LedgerEntry, make_ledger
 from warpflat.flat.cutting.refine_piece import refine_along
 from warpflat.flat.cutting.separate_pieces import separate
+from warpflat.flat.flattening.fit_report import garment_wear
 from warpflat.flat.flattening.progress import Progress
 from warpflat.flat.flattening.result import Flattening
 from warpflat.flat.model.network import SpringNetwork
@@ -358,10 +359,26 @@ def test_what_is_known_of_each_face_goes_along_with_cuts_and_refinements(bodice:
     assert [len(part.development.positions) for part in parts] == [len(part.surface.vertices) for part in parts]
 
 
+def test_a_trial_on_several_pieces_counts_their_cloth_as_the_garment_does():
+    """By its flat area, of which the worn stretch leaves less; a mouth of just the least width can be sewn."""
+    pieces = [
+        warpflat.flatten(make_shape("bodice", resolution=13), fabric="woven"),
+        warpflat.flatten(make_shape("cylinder", resolution=9), fabric="jersey", wear=warpflat.Wear(stretch_weft=0.15)),
+    ]
+    entry = LedgerEntry.measure("seam", pieces, pieces, paths=[], cracks=[])
+    told = garment_wear({piece.surface.name: piece.measures for piece in pieces})
+    assert entry.outside_before == pytest.approx(told["outside"])
+    assert entry.outside_before > 0.0
+    widths = (LEAST_MOUTH, 0.99 * LEAST_MOUTH)
+    assert [replace(entry, opening=width, angle=0.1).can_be_sewn for width in widths] == [True, False]
+
+
 def test_remedies_go_with_what_they_were_for():
     advised = warpflat.advise(warpflat.flatten(make_shape("bodice", resolution=13), fabric="woven"))
     assert advised.remedies
     assert warpflat.advise(advised).notes == advised.notes
+    parted = replace(cut(advised, "centre"), remedies=advised.remedies)
+    assert all(part.remedies == () for part in separate(parted))
     looser = warpflat.change_fabric(advised, "jersey")
     assert looser.fit.within_limits
     assert looser.remedies == warpflat.advise(looser).remedies == ()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from warpflat.flat.flattening.edit import change_surface
 from warpflat.flat.flattening.flatten_piece import flatten, nearly_closed_notes
 from warpflat.flat.surface.mesh import Surface
 from warpflat.flat.surface.repair.validate import make_surface
@@ -38,6 +39,14 @@ def test_a_sphere_with_a_hole_is_flattened_without_flips_and_with_a_note_on_its_
     assert "to vertex 0 would" in note
     length = ROWS * 2e2 * RADIUS * np.sin(np.radians(180.0 - hole) / ROWS / 2.0)
     assert f"a cut of {length:.1f} cm" in note
+
+
+def test_the_note_is_of_the_surface_that_a_piece_was_moved_to() -> None:
+    result = flatten(sphere(60.0))
+    larger = change_surface(result, 1.2 * result.surface.vertices)
+    told = [[note for note in piece.notes if "nearly closed" in note] for piece in (result, larger)]
+    assert told == [nearly_closed_notes(piece.surface) for piece in (result, larger)]
+    assert told[0] != told[1]
 
 
 def test_pieces_that_lie_flat_get_no_such_note() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -124,6 +126,9 @@ def test_a_place_in_words():
     assert place_in_words(surface, 4 * 11 + 5) == "on bust line, 20 mm from princess line"
     assert "20 mm below bust line" in place_in_words(surface, 2 * 11 + 2)
     assert place_in_words(sheet(), 24) == "vertex 24 at (0.020, 0.020, 0.000) m"
+    # Of a file with further vertices, which no face has, it is the file's.
+    read = replace(sheet(), input_vertices=np.zeros((124, 3)), input_index=np.arange(3, 124, dtype=np.int32))
+    assert place_in_words(read, 24) == "vertex 27 at (0.020, 0.020, 0.000) m"
 
 
 def test_the_peak_is_where_most_energy_lies():

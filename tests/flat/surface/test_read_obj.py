@@ -124,6 +124,13 @@ def test_file_that_is_cut_short_is_refused(tmp_path: Path) -> None:
         read_obj(path)
 
 
+def test_no_line_takes_the_name_of_another(tmp_path: Path) -> None:
+    rows = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"
+    mesh = read(rows + "g dart\nl 1 2\nl 3 4\ng dart_1\nl 2 3\n", tmp_path / "a.obj")
+    lines = {name: row.tolist() for name, row in mesh.chains.items()}
+    assert lines == {"dart_1": [0, 1], "dart_2": [2, 3], "dart_1_": [1, 2]}
+
+
 def panels(style: str) -> str:
     """A front and a back, each a strip of three quads, with their names where different programs write them."""
     points = {

@@ -59,6 +59,11 @@ def test_indices_may_count_the_vertices_of_the_file():
     assert line_from_indices(surface, [1, 2], as_read=True).tolist() == [5, 0]
     with pytest.raises(InputError, match="vertex 0 of the input is not part"):
         line_from_indices(surface, [0, 2], as_read=True)
+    # So do the messages.
+    with pytest.raises(InputError, match="both ends of the line are vertex 3 of"):
+        line_between(surface, 3, 3, as_read=True)
+    with pytest.raises(InputError, match="its nearest vertex is 7 at"):
+        line_between(surface, 3, surface.vertices[5] - [0.0, 9.0, 0.0], as_read=True)
 
 
 def test_shortest_path_takes_indices_or_points_and_keeps_to_the_chord(sheet):

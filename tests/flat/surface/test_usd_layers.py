@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from warpflat.core.errors import InputError
-from warpflat.core.input_files import listening_to_reads
+from warpflat.core.input_files import FORMATS, listening_to_reads
+from warpflat.core.usd_layers import check_layers
 from warpflat.flat.surface.io.read import read_surface
 
 MESH = """#usda 1.0
@@ -101,4 +103,14 @@ def test_a_package_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert UsdUtils.CreateNewUsdzPackage("stage.usda", "stage.usdz")
     for name in ("mesh.usda", "stage.usda"):
         (tmp_path / name).unlink()
-    assert len(read_surface(tmp_path / "stage.usdz").faces) == 1
+    package = tmp_path / "stage.usdz"
+    assert len(read_surface(package).faces) == 1
+    # Its layers are parts of one file, which counts once.
+    for share in (1.5, 0.5):
+        most = replace(FORMATS["mesh"], most=int(share * package.stat().st_size))
+        monkeypatch.setattr("warpflat.core.usd_layers.FORMATS", {"mesh": most})
+        if share > 1.0:
+            check_layers(package)
+        else:
+            with pytest.raises(InputError, match="which has"):
+                check_layers(package)

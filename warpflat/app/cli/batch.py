@@ -61,9 +61,9 @@ def batch(file: Path, out: Path | None, workers: int, scheduler: str | None, qui
     if find_spec("distributed") is None:
         if scheduler is not None:
             raise InputError('--scheduler needs Dask: pip install ".[batch]" in a checkout, or leave it out')
-        if workers > 1:
+        if workers > 1 and not quiet:
             tell('note: --workers needs Dask (pip install ".[batch]" in a checkout); the tasks run one after the other')
-            workers = 1
+        workers = 1
     start_warp_silently()
     folder = out if out is not None else Path("out") / file.stem
     with _Bar(file.stem, len(tasks), quiet=quiet) as bar:

@@ -41,7 +41,7 @@ __all__ = ["cuts"]
     "--turn", nargs=2, metavar="DART KIND", help="A form's dart becomes a seam, ease, a pleat, gathers or nothing."
 )
 @click.option("--at", metavar="LINE", help="Where the mouth of the rotated or second dart lies, as 'shoulder left'.")
-@output_options(printed="ledger.json, with --apply metrics.json,")
+@output_options(printed="ledger.json, with --apply metrics.json, of an edited dart edit.json,")
 def cuts(
     scene: Path,
     output: Output,

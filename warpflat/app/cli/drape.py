@@ -14,7 +14,6 @@ from warpflat.app.cli.options import (
     Output,
     output_options,
     scene_option,
-    tell,
 )
 from warpflat.app.cli.run import report_run, run_and_report, start_warp_silently
 
@@ -87,8 +86,7 @@ def drape(
     if is_pattern_file(scene):
         if edges:
             lines, notes = edge_table(scene, sewing=seams, units=units)
-            for note in notes:
-                tell(f"note: {note}")
+            output.tell_notes(notes)
             click.echo("\n".join(lines))
             return DONE
         start_warp_silently()

@@ -42,7 +42,7 @@ __all__ = ["export"]
 @click.option(
     "--units",
     type=click.Choice(get_args(PrintedUnit)),
-    help="Of lengths that are printed; in: of the DXF, too.  [default: cm]",
+    help="Of lengths that are printed; in: of the DXF, too.  [default: the pattern's, or cm]",
 )
 @out_option("Folder for the files.  [default: the run's, or out/NAME of another program's file]")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes.")

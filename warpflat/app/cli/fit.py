@@ -17,7 +17,6 @@ from warpflat.app.cli.options import (
     output_options,
     scene_option,
     scene_options,
-    tell,
 )
 from warpflat.app.cli.run import report_run, start_warp_silently
 from warpflat.app.scene.plain_names import with_plain_letters
@@ -29,7 +28,7 @@ __all__ = ["fit"]
 _ANEW = "--seams auto finds new seams, --seams uv flattens its pieces anew"
 _FILES = """\b
   NAME.fitted.obj  the garment on the other body [m], with the islands, groups and materials of its file
-  NAME.body.obj    that body, standing as the first one does [m]
+  NAME.body.obj    that body, standing as the first one does, or with --keep-pose as its scan is posed [m]
   fit.json         ease by level before and after, of every body
   fit.csv          the same as a table, of several bodies, each of which has a folder in DIR"""
 
@@ -151,9 +150,7 @@ def fit(
             if keeps_pattern(job, tables)
             else []
         )
-        output.tell_notes([*job.notes, *kept] if one is carried[0] else ())
-        for note in one.notes:
-            tell(f"note: {note}")
+        output.tell_notes([*([*job.notes, *kept] if one is carried[0] else ()), *one.notes])
         if len(bodies) > 1 and output.tells:
             click.echo(f"{one.body}:")
         # Of JSON only that of all bodies is printed.

@@ -47,7 +47,7 @@ def flatten(
     output: Output,
     **options: Any,
 ) -> int:
-    """Flatten one mesh: OBJ, PLY, STL, OFF, GLB, VRM, glTF or USD.
+    """Flatten one mesh: OBJ, PLY, STL, OFF, GLB, glTF, VRM or USD.
 
     \b
     Examples:

@@ -24,7 +24,7 @@ __all__ = ["mannequin", "read_lengths", "sized_body"]
     type=click.Choice(["women", "men", "children"]),
     help="Completes the measurements.  [default: the size's, or women]",
 )
-@click.option("--scan", metavar="FILE", help="The mesh of a standing body: OBJ, PLY, STL, OFF, GLB, glTF or USD.")
+@click.option("--scan", metavar="FILE", help="The mesh of a standing body: OBJ, PLY, STL, OFF, GLB, glTF, VRM or USD.")
 @click.option("--units", metavar="UNIT", help="Of the scan: m, cm, mm ...  [default: told from its height]")
 @click.option("--facing", metavar="AXIS", help="Where the scan looks, such as +z.  [default: told from its shape]")
 @click.option("--up", metavar="AXIS", help="Where the scan's head is, such as +y.  [default: told from its shape]")

@@ -103,7 +103,9 @@ def new(
     elif scan is None:
         mannequin_from_table(body, path_of=Path)
     elif not scan.is_file():
-        raise InputError(f"{scan}: no such file; give the mesh of a standing body, OBJ, PLY, STL, OFF or GLB")
+        raise InputError(
+            f"{scan}: no such file; give the mesh of a standing body, OBJ, PLY, STL, OFF, GLB, glTF, VRM or USD"
+        )
     text = scene_text(offer, table, chosen, file=file.as_posix(), fabric=fabric)
     file.parent.mkdir(parents=True, exist_ok=True)
     with atomic_path(file) as temporary:

@@ -56,7 +56,7 @@ What comes out, in DIR:
   mannequin.usdc  of a garment on a body: that body, to which frames.usdc refers
   picture.png     surface and pattern side by side, with a scale in J/m2
   walked.png      of a garment on a body: both sides of every seam laid along each other
-  wear.png        where the scene has [wear]: strain when worn; of a mesh NAME.wear.png
+  wear.png        where the scene has [wear], or the cloth is smaller than the body: strain when worn; of a mesh NAME.wear.png
   review.html     all of it on one page, with the film; needs no network
   NAME.dxf        the pattern for apparel CAD: cut and sewing lines, notches, grain; of several sizes with NAME.rul
   NAME.svg        the same for screen and plotter, in millimetres

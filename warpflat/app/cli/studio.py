@@ -49,7 +49,7 @@ def studio(
     """Edit a scene on a page in the browser: body, form, cloth, ease, grain and cuts, with the pattern beside it.
 
     Saving writes a scene file beside the scene or mesh that was opened, under a name of its own, and runs it from scratch. A MESH
-    is one piece: OBJ, PLY, STL, OFF, GLB, glTF or USD. Without either it begins with the basic block of size EU 38. Ctrl-C ends
+    is one piece: OBJ, PLY, STL, OFF, GLB, glTF, VRM or USD. Without either it begins with the basic block of size EU 38. Ctrl-C ends
     the studio. The address that it prints has a token in it: only who opens that address is let in.
 
     It needs viser: pip install ".[studio]" in a checkout.

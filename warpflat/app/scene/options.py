@@ -138,7 +138,7 @@ SCENE_OPTIONS: Mapping[str, SceneOption] = {
     "model": SceneOption(
         "--model NAME",
         "auto: springs on quads along the grain, else membrane, cells in which the cloth is measured as worn; membrane: "
-        "everywhere.  [default: auto]",
+        "everywhere; springs: refused where they would be another cloth.  [default: auto]",
     ),
     "wear.stretch_warp": SceneOption("--stretch-warp SHARE", "Worn so much longer than flat along the warp: 0.1.", float),
     "wear.stretch_weft": SceneOption("--stretch-weft SHARE", "The same along the weft.", float),

@@ -432,7 +432,7 @@ class ClothTable(Table):
     match: list[str] = Field(default_factory=list)
     """Seams at whose first notch both sides lie on the same stripe in the marker."""
     interfacing: Annotated[str, Field(max_length=40)] = ""
-    """What the interfacing is called; with a name facings and waistbands are cut from it too."""
+    """What the interfacing is called; with a name facings, waistbands, cuffs, collars and flies are cut from it too."""
     pocketing: Annotated[str, Field(max_length=40)] = ""
     """What the cloth of pocket bags is called; with a name these are cut from it, not from the shell's cloth."""
 

@@ -154,7 +154,7 @@ class LedgerEntry:
     @property
     def can_be_sewn(self) -> bool:
         """Whether it opens by 5 mm or more, and leaves no flipped face."""
-        return not self.flipped_faces and (self.mouth is None or self.mouth > LEAST_MOUTH)
+        return not self.flipped_faces and (self.mouth is None or self.mouth >= LEAST_MOUTH)
 
     @property
     def helps(self) -> bool:
@@ -187,7 +187,7 @@ class LedgerEntry:
 
 def _share_outside(pieces: Sequence[Flattening]) -> float:
     """Return the share of the cloth of some pieces that is strained beyond its limit."""
-    areas = [float(piece.network.cell_arrays.area.sum()) for piece in pieces]
+    areas = [float(piece.fit.area.sum()) for piece in pieces]
     return sum(piece.fit.outside * area for piece, area in zip(pieces, areas, strict=True)) / sum(areas)
 
 

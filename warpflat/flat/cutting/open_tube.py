@@ -56,7 +56,7 @@ def draw_openings(surface: Surface, plans: Sequence[CutPlan]) -> tuple[Surface, 
         plans: the cuts.
 
     Returns:
-        The surface, uncut, with the lines "opening", "opening_2" and so on; the cuts along these.
+        The surface, uncut, with the lines "opening", "opening 2" and so on; the cuts along these.
     """
     from scipy.sparse.csgraph import dijkstra
 

@@ -17,6 +17,7 @@ from warpflat.flat.cutting.cut_piece import cut
 from warpflat.flat.cutting.cut_plan import CutPlan
 from warpflat.flat.cutting.ledger import evaluate
 from warpflat.flat.flattening.fit_report import Remedy
+from warpflat.flat.flattening.keep_apart import costs_much
 from warpflat.flat.flattening.progress import CONTACT
 from warpflat.flat.flattening.result import Flattening
 from warpflat.flat.model.fit import WornFit
@@ -45,12 +46,10 @@ def advise(result: Flattening) -> Flattening:
     wearing was asked for, each of them is made and relaxed on trial, and those that help are kept. A note names the cut that would spare
     the piece a contact that costs much.
     """
-    notes = [note for note in result.notes if not note.startswith(_CONTACT_COSTS)]
-    note = contact_note(result)
-    if note is not None:
-        notes.append(note)
-    if tuple(notes) != result.notes:
-        result = replace(result, notes=tuple(notes))
+    costs = tuple(filter(None, [contact_note(result)]))
+    notes = (*(note for note in result.notes if not note.startswith(_CONTACT_COSTS)), *costs)
+    if notes != result.notes:
+        result = replace(result, notes=notes, relaxation_notes=(*result.relaxation_notes, *costs))
     found = remedies(result, result.fit, trial=result.wear is not None)
     return result.with_remedies(found) if found or result.remedies else result
 
@@ -105,8 +104,7 @@ def contact_note(result: Flattening) -> str | None:
     last = result.stages[-1]
     if last.name != CONTACT or len(result.stages) < 2:
         return None
-    free = result.stages[-2].model_energy_j
-    if result.contact_energy <= result.options.contact_share * free:
+    if not costs_much(result.network, result.options, result.stages[-2].model_energy_j, last.model_energy_j):
         return None
     path = cut_between_contacts(result)
     piece = result.unsewn or result

@@ -131,6 +131,8 @@ def _part(result: Flattening, piece: CutPart) -> Flattening:
         development=replace(result.development, positions=result.development.positions[used]),
         stages=(*result.stages[:-1], last),
         cuts=tuple(cuts),
+        # They were found for the whole.
+        remedies=(),
         close=None if result.close is None else result.close[piece.face_index],
         unsewn=None if result.unsewn is None else _part(result.unsewn, piece),
     )

@@ -93,11 +93,10 @@ class Demand:
         """Return the share of the cloth that is beyond a limit, by the area of each place, #C [m2]."""
         return float(area[self.beyond].sum() / max(float(area.sum()), 1e-300))
 
-    def amount(self, place: int, way: int | None = None) -> Amount:
-        """Return what is asked at a place in one way, a column of `shares`, or in the one that asks for most."""
-        column = int(np.abs(self.shares[place]).argmax()) if way is None else way
-        limit = self.fabric.shear_limit if self.ways[column] == "shear" else self.fabric.strain_limit
-        return Amount(way=self.ways[column], value=float(self.shares[place, column]) * limit, limit=limit)
+    def amount(self, place: int, way: int) -> Amount:
+        """Return what is asked at a place in one way, a column of `shares`."""
+        limit = self.fabric.shear_limit if self.ways[way] == "shear" else self.fabric.strain_limit
+        return Amount(way=self.ways[way], value=float(self.shares[place, way]) * limit, limit=limit)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,6 +18,7 @@ from warpflat.flat.fabric.fabric import Fabric
 from warpflat.flat.fabric.library import as_fabric
 from warpflat.flat.flattening.applied_cut import AppliedCut, cut_sides
 from warpflat.flat.flattening.datum import datum_extent
+from warpflat.flat.flattening.flatten_piece import nearly_closed_notes
 from warpflat.flat.flattening.keep_apart import keep_apart
 from warpflat.flat.flattening.progress import Progress
 from warpflat.flat.flattening.relax_piece import relax_piece
@@ -143,10 +144,12 @@ def change_surface(
     task = _continuation_task(result, moved, result.fabric, f"surface:{surface.name}", options, callback)
     cuts = tuple(replace(made, length=path_length(surface, made.paths)) for made in result.cuts)
     relaxed = _continue(result, task, result.positions)
-    # A note on a chosen datum has its length, which is another one now.
+    # A note on a chosen datum has its length, and one on a nearly closed piece its border and area, which are others now.
     chosen, now = (datum_extent(of, result.datum) for of in (before, surface))
-    notes = tuple(note.removesuffix(chosen) + now if note.endswith(chosen) else note for note in relaxed.notes)
-    return replace(relaxed, surface=surface, cuts=cuts, notes=notes)
+    closed, still = (nearly_closed_notes(of) for of in (before, surface))
+    notes = [note.removesuffix(chosen) + now if note.endswith(chosen) else note for note in relaxed.notes]
+    notes = [note for note in notes if note not in closed] + still
+    return replace(relaxed, surface=surface, cuts=cuts, notes=tuple(notes))
 
 
 def _refuse_faces(surface: Surface, wrong: NDArray[np.integer], what: str, right: str) -> None:
@@ -237,6 +240,7 @@ def _continue(result: Flattening, task: RelaxationTask, positions: FloatArray) -
         history=np.concatenate([result.history.reshape(-1, 4), np.array(task.history).reshape(-1, 4)]),
         # They were found for what it was.
         remedies=(),
-        notes=(*result.notes, *(note for note in task.notes if note not in result.notes)),
+        notes=(*(note for note in result.notes if note not in result.relaxation_notes), *task.notes),
+        relaxation_notes=tuple(task.notes),
         options=task.options,
     )

@@ -268,6 +268,7 @@ def relax_developed(piece: DevelopedPiece) -> Flattening:
         stages=(developed, *stages),
         history=np.array(task.history),
         notes=(*task.surface.notes, *piece.notes, *development.notes, *task.notes),
+        relaxation_notes=tuple(task.notes),
         wear=task.wear,
         options=task.options,
     )

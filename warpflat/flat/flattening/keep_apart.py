@@ -9,15 +9,17 @@ from warpflat.flat.flattening.conformal_layout import conformal_layout
 from warpflat.flat.flattening.harmonic_layout import harmonic_layout
 from warpflat.flat.flattening.progress import CONTACT, Stage, make_stage, make_stages
 from warpflat.flat.flattening.relaxation_task import RelaxationTask, RelaxedPiece
+from warpflat.flat.model.network import SpringNetwork
 from warpflat.flat.solver.contact import open_cracks, relax_with_contact, swirl
 from warpflat.flat.solver.grain import grain_alignments
+from warpflat.flat.solver.options import RelaxOptions
 from warpflat.flat.solver.steps import Relaxation
 from warpflat.flat.surface.connectivity import components_of
 from warpflat.flat.surface.injective import is_injective, overlap_area
 from warpflat.flat.surface.laplacian import factor_pays
 from warpflat.flat.surface.mesh import Surface
 
-__all__ = ["keep_apart"]
+__all__ = ["costs_much", "keep_apart"]
 
 # Where contact costs much, relaxation also starts from its layout swirled by these angles about the middle [rad]. A spiral of 2.5 turns
 # needs the wide ones; by the narrow ones the sides of a slit slide along each other.
@@ -25,8 +27,14 @@ _SWIRLS = (-3.0, -1.5, -0.1, 0.1, 1.5, 3.0)
 # Pieces of more vertices are not: that takes six times as long as contact alone. Nor does contact start again where it has not come to
 # rest.
 _MOST_SWIRLED = 10_000
-# Nor are pieces that contact strains by less than this: a part of a circle lies flat almost without energy.
+# Contact that strains a piece by less than this costs little: a part of a circle lies flat almost without energy.
 _IMPERCEPTIBLE = 1e-3
+
+
+def costs_much(network: SpringNetwork, options: RelaxOptions, free: float, parted: float) -> bool:
+    """Return whether contact, from the energy without to that with it [J], costs more than the share that is allowed, and is to be felt."""
+    least = network.spring_arrays.energy_of_strain(_IMPERCEPTIBLE)
+    return parted > free + max(options.contact_share * free, least)
 
 
 def on_the_way(surface: Surface, start: FloatArray, end: FloatArray) -> FloatArray:
@@ -71,8 +79,7 @@ def keep_apart(
         outcome = relax_with_contact(state, 1e-3 * task.options.gap_mm)
         if outcome is not None and outcome.converged:
             before = relaxed.model_energy_j
-            least = max(task.options.contact_share * before, state.energy_of_strain(_IMPERCEPTIBLE))
-            costly = outcome.energies.potential > before + least
+            costly = costs_much(network, task.options, before, outcome.energies.potential)
             if costly and len(surface.vertices) <= _MOST_SWIRLED:
                 # Which stretches of a border come to lie beside each other is a matter of the start: a spiral may be
                 # wound up or unwound. So it begins once more where the piece began, and with what comes of that, swirled.

@@ -64,7 +64,6 @@ def relax_piece(
     before = 0.0 if outcome.first_steps is None else outcome.first_steps.seconds
     outcome = replace(outcome, seconds=time.perf_counter() - started - before)
     state = piece.state
-    task.notes += [note for note in outcome.notes if note not in task.notes]
     return RelaxedPiece(network=state.network, positions=state.positions(), begin=begin, outcome=outcome)
 
 

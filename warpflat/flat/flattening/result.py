@@ -49,6 +49,7 @@ class Flattening:
         stages: development and relaxation, with their energies.
         history: #K by 4, step, model energy [J], guard energy [J], residual, at every convergence check.
         notes: what was repaired or chosen, one sentence each.
+        relaxation_notes: those of the notes that tell how it was relaxed last; after an edit they hold no more.
         cuts: what `warpflat.cut` has cut since the first relaxation.
         wear: how the piece is to be worn, if that was asked for.
         options: options of the last relaxation.
@@ -69,6 +70,7 @@ class Flattening:
     stages: tuple[Stage, ...]
     history: FloatArray
     notes: tuple[str, ...]
+    relaxation_notes: tuple[str, ...] = ()
     cuts: tuple[AppliedCut, ...] = ()
     wear: Wear | None = None
     options: RelaxOptions = field(default_factory=RelaxOptions)

@@ -15,6 +15,7 @@ import warp as wp
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
 from warpflat.core.sorting import counting_sort
+from warpflat.core.sums import dot
 from warpflat.flat.fabric.fabric import Fabric, grain_axes
 from warpflat.flat.surface.cells import CellArrays, face_creases, first_of_faces
 from warpflat.flat.surface.half_edges import half_edges_of
@@ -130,6 +131,11 @@ class SpringArrays(SpringGeometry):
     def stiffness(self) -> FloatArray:
         """The stiffnesses, #S [N/m]."""
         return self._unlisted(self.listed_stiffness)
+
+    def energy_of_strain(self, strain: float) -> float:
+        """Return the energy that the springs store if each is strained by so much [J]."""
+        # Each spring is listed twice.
+        return 0.25 * strain**2 * dot(self.listed_stiffness * self.listed_length, self.listed_length)
 
     def _unlisted(self, listed: FloatArray) -> FloatArray:
         values = np.empty(self.count)

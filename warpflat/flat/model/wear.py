@@ -56,7 +56,7 @@ class Wear:
             if not 0.0 <= value <= highest:
                 hint = f" (if that is in percent, write {value / 100:g})" if unit == "" and 2.0 < value <= 100.0 else ""
                 raise InputError(
-                    f"wear: {key} = {value:g} {unit}".rstrip() + f"; must be 0 to {highest:g} {unit}{hint}"
+                    f"wear: {key} = {value:g} {unit}".rstrip() + f"; must be 0 to {highest:g} {unit}".rstrip() + hint
                 )
         if self.pressure and self.stretch_warp > 0.0 and self.stretch_weft > 0.0:
             raise InputError(
@@ -112,11 +112,15 @@ def intended_stretch(
     if not wear.is_tight:
         return None, ()
     stretch = np.tile([1.0 + wear.stretch_warp, 1.0 + wear.stretch_weft], (len(surface.faces), 1))
+    limit = f"{fabric.name}'s limit of {100 * fabric.strain_limit:.3g} %"
+
+    def beyond(asked: float) -> tuple[str, ...]:
+        """Return what is told of a stretch that is asked for beyond the limit."""
+        words = f"a stretch of {100 * asked:.3g} % is asked for, beyond {limit}: the fit is judged from there"
+        return (words,) if asked > fabric.strain_limit else ()
+
     if not wear.pressure:
-        asked = max(wear.stretch_warp, wear.stretch_weft)
-        limit = f"{fabric.name}'s limit of {100 * fabric.strain_limit:.3g} %"
-        beyond = f"a stretch of {100 * asked:.3g} % is asked for, beyond {limit}: the fit is judged from there"
-        return stretch, (beyond,) if asked > fabric.strain_limit else ()
+        return stretch, beyond(max(wear.stretch_warp, wear.stretch_weft))
     network = SpringNetwork.build(surface, fabric, positions, grain_angle=grain_angle, device="cpu")
     area = network.cell_arrays.area
     face_area = np.maximum(np.bincount(network.cell_arrays.face, area, minlength=len(surface.faces)), 1e-300)
@@ -136,13 +140,12 @@ def intended_stretch(
     along = f"{thread}, which runs around the body"
     if not given and float(strain[:, other] @ face_area / face_area.sum()) > _BOTH * float(strain[:, around].mean()):
         along = "warp and weft, by the body's curvature along each"
-    notes = [f"pressure {wear.pressure:g} Pa by stretch along {along}"]
+    notes = [f"pressure {wear.pressure:g} Pa by stretch along {along}", *beyond(given)]
     if unused := unused_stretch(wear, thread):
         notes.append(unused)
     if short > 0.001:
         notes.append(
-            f"{wear.pressure:g} Pa cannot be reached within {fabric.name}'s limit of {100 * fabric.strain_limit:.3g} % "
-            f"on {100 * short:.0f} % of the piece: too flat, or the cloth too soft"
+            f"{wear.pressure:g} Pa cannot be reached within {limit} on {100 * short:.0f} % of the piece: too flat, or the cloth too soft"
         )
     return stretch, tuple(notes)
 

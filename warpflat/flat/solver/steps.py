@@ -98,13 +98,12 @@ class Relaxation:
         *,
         start: FloatArray,
         alignments: Sequence[GrainAlignment] = (),
-        least_strain: float = 1e-9,
     ) -> None:
         """Place a network at rest in a layout (#V by 2 [m])."""
         n, f, device = network.vertex_count, network.face_count, network.device
         if np.shape(start) != (n, 2):
             raise InputError(f"start layout has shape {np.shape(start)}; must be ({n}, 2), a point per vertex")
-        self.network, self.options, self.alignments, self.least_strain = network, options, alignments, least_strain
+        self.network, self.options, self.alignments, self.least_strain = network, options, alignments, 1e-9
         self.time_step = options.time_step
         self.position = wp.array(np.ascontiguousarray(start), dtype=wp.vec2d, device=device)
         self.velocity, self.force, self.load, anchor, first_guess = (
@@ -323,16 +322,10 @@ class Relaxation:
 
     # --- convergence
 
-    def energy_of_strain(self, strain: float) -> float:
-        """Return the energy that the springs store if each is strained by so much [J]."""
-        springs = self.network.spring_arrays
-        # Each spring is listed twice.
-        return 0.25 * strain**2 * dot(springs.listed_stiffness * springs.listed_length, springs.listed_length)
-
     @cached_property
     def negligible_energy(self) -> float:
         """The energy under the least strain everywhere [J]."""
-        return self.energy_of_strain(self.least_strain)
+        return self.network.spring_arrays.energy_of_strain(self.least_strain)
 
     def is_free_of_strain(self, potential: float) -> bool:
         """Return whether an energy of the cloth [J] is negligible, seams included: forces left are rounding errors."""

@@ -152,7 +152,6 @@ class Outcome:
         residual: largest force on a vertex over the mean spring force; not a number after first steps.
         energies: at the end [J].
         seconds: wall clock.
-        notes: what was chosen or is worth a warning, one sentence each.
         left: the estimate of what was still to be relaxed, where there is one.
         first_steps: of the paper's steps with which it began; None where it did not.
         first_layout: #V by 2, the layout after these [m].
@@ -164,7 +163,6 @@ class Outcome:
     residual: float
     energies: Energies
     seconds: float
-    notes: tuple[str, ...] = ()
     left: Remainder | None = None
     first_steps: Outcome | None = None
     first_layout: FloatArray | None = field(default=None, repr=False)

@@ -72,7 +72,7 @@ def place_in_words(surface: Surface, vertex: int, *, lines: int = 2) -> str:
     """Describe the place of a vertex for a pattern maker, such as "4 mm above bust line, 12 mm from princess front".
 
     Distances to the nearest lines, two unless more are asked for, are straight in space: near a line that is what a tape measures to
-    less than a millimetre.
+    less than a millimetre. Without a line the vertex is named, as it was read.
     """
     here = surface.vertices[vertex]
     offsets = {name: nearest_on_polyline(here, surface.vertices[line]) - here for name, line in surface.lines.items()}
@@ -87,7 +87,8 @@ def place_in_words(surface: Surface, vertex: int, *, lines: int = 2) -> str:
         # Within 45 degrees of the vertical a line lies above or below, else beside.
         side = "above" if rise > np.sqrt(0.5) else "below" if rise < -np.sqrt(0.5) else "from"
         phrases.append(f"{away[name] * 1e3:.0f} mm {side} {name}")
-    return ", ".join(phrases) or f"vertex {vertex} at ({', '.join(f'{x:.3f}' for x in here)}) m"
+    at = ", ".join(f"{x:.3f}" for x in here)
+    return ", ".join(phrases) or f"vertex {int(surface.input_index[vertex])} at ({at}) m"
 
 
 def smooth_to_vertices(surface: Surface, face_density: ArrayLike, *, smoothing_length: float = 0.0) -> FloatArray:

@@ -82,9 +82,9 @@ class Scale:
         return cls(high=max(least, weighted_percentile(values, areas, SHARE)), colours=colours)
 
     @classmethod
-    def both_ways(cls, values: FloatArray, areas: FloatArray, least: float) -> Scale:
-        """Return the scale around 0, red above and blue below, whose ends are no nearer than `least`."""
-        reach = max(least, weighted_percentile(np.abs(values), areas, SHARE))
+    def both_ways(cls, values: FloatArray, areas: FloatArray, least: float, most: float = np.inf) -> Scale:
+        """Return the scale around 0, red above and blue below, whose ends lie from `least` to `most`."""
+        reach = min(most, max(least, weighted_percentile(np.abs(values), areas, SHARE)))
         return cls(low=-reach, high=reach, colours="RdBu_r")
 
     @property

@@ -336,17 +336,18 @@ def _write_files(drafted: DraftedGarment, to: str | Path, *, name: str, options:
     from warpflat.pattern.export.pdf import too_many_sheets
 
     files, notes, metrics = list[str](), list[str](), dict[str, Any]()
-    refused = too_many_sheets(drafted, options.paper) if "pdf" in options.formats else ""
-    notes += [f"pattern.pdf was left out: {refused}"] if refused else []
     with output_folder(to) as folder:
         for kind in FORMATS:
-            if kind in options.formats and not (kind == "pdf" and refused):
-                with optional_step(f"{FORMATS[kind].format(name)} was left out", folder=folder):
-                    written, lost = _write(
-                        drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper
-                    )
-                    files += written
-                    notes += lost
+            if kind not in options.formats:
+                continue
+            # What nobody would print is no loss.
+            refused = too_many_sheets(drafted, options.paper) if kind == "pdf" else ""
+            with optional_step(f"{FORMATS[kind].format(name)} was left out", folder=folder, is_needed=not refused):
+                if refused:
+                    raise InputError(refused)
+                written, lost = _write(drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper)
+                files += written
+                notes += lost
         if options.cloth is not None:
             with optional_step("no marker was made", folder=folder) as not_made:
                 marked, remarks, plans = _marker(drafted, folder, name, options.cloth, options.marker_seconds)

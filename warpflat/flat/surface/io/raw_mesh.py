@@ -5,7 +5,7 @@ The process that reads a USD file loads this module, which therefore brings no W
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 
-__all__ = ["ALL_PRIMS", "RawMesh", "following_corners", "numbered", "objects_in_turn"]
+__all__ = ["ALL_PRIMS", "RawMesh", "following_corners", "line_name", "numbered", "objects_in_turn"]
 
 #: Stands for all mesh prims of a stage, or all nodes of a scene.
 ALL_PRIMS = "*"
@@ -58,6 +58,14 @@ def numbered(names: Sequence[str]) -> tuple[NDArray[np.int64], tuple[str, ...]]:
     """Return a number for each name, from 0 in their order, and the names."""
     number = {name: k for k, name in enumerate(dict.fromkeys(names))}
     return np.fromiter(map(number.__getitem__, names), dtype=np.int64, count=len(names)), tuple(number)
+
+
+def line_name(name: str, number: int, count: int, taken: Container[str]) -> str:
+    """Return the name of the line of a number, from 1, among `count` of one name in a file; with "_" behind it where it is taken."""
+    found = name if count == 1 else f"{name}_{number}"
+    while found in taken:
+        found += "_"
+    return found
 
 
 def objects_in_turn(

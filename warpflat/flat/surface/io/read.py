@@ -151,7 +151,7 @@ def read_scan(path: str | PathLike[str]) -> tuple[FloatArray, IntArray]:
     """Read any mesh as it stands, closed or in several parts or prims, such as the scan of a body.
 
     Returns:
-        #V by 3, positions in the file's own unit; #F by 4, faces, -1 in the last column of a triangle.
+        #V by 3, positions in the file's own unit, those of USD in metres; #F by 4, faces, -1 in the last column of a triangle.
 
     Raises:
         InputError: one line that names the file.

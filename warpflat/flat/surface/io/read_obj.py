@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.flat.surface.connectivity import chain_lines, join_labels
-from warpflat.flat.surface.io.raw_mesh import RawMesh, following_corners, numbered
+from warpflat.flat.surface.io.raw_mesh import RawMesh, following_corners, line_name, numbered
 from warpflat.flat.surface.repair.polygons import pad_corners
 
 __all__ = ["read_obj"]
@@ -237,9 +237,9 @@ def _line_elements(rows: list[tuple[str, str, int, int]], total: int) -> dict[st
                 f"line {line}: 'l {text.strip()[:40]}' needs two or more vertices, each one of the file's {total:,}"
             )
         elements.setdefault(group or "line", []).append(path)
-    found = {}
+    found = dict[str, NDArray[np.int64]]()
     for name, paths in elements.items():
         chains = chain_lines(paths)
         for number, row in enumerate(chains, start=1):
-            found[name if len(chains) == 1 else f"{name}_{number}"] = np.array(row, dtype=np.int64)
+            found[line_name(name, number, len(chains), found)] = np.array(row, dtype=np.int64)
     return found

@@ -18,7 +18,7 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.text import list_some, quote_value
 from warpflat.core.usd_layers import check_layers
 from warpflat.core.usd_process import UNREADABLE
-from warpflat.flat.surface.io.raw_mesh import ALL_PRIMS, RawMesh, numbered, objects_in_turn
+from warpflat.flat.surface.io.raw_mesh import ALL_PRIMS, RawMesh, line_name, numbered, objects_in_turn
 from warpflat.flat.surface.repair.polygons import pad_corners
 
 __all__ = ["read_usd_stage"]
@@ -249,15 +249,12 @@ def _read_curves(mesh: Any, to_metres: ToMetres, notes: list[str]) -> dict[str, 
         periodic = _value(lines.GetWrapAttr()) == UsdGeom.Tokens.periodic
         place, _ = to_metres(points, prim)
         start = 0
-        for number, count in enumerate(counts):
+        for number, count in enumerate(counts, start=1):
             part = place[start : start + count]
             start += count
             if periodic:
                 part = np.concatenate([part, part[:1]])
-            key = name if len(counts) == 1 else f"{name}_{number + 1}"
-            while key in found:
-                key += "_"
-            found[key] = part
+            found[line_name(name, number, len(counts), found)] = part
     return found
 
 

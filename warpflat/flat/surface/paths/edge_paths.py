@@ -133,7 +133,8 @@ def as_vertex(surface: Surface, place: int | ArrayLike, *, as_read: bool = False
         x, y, z = surface.vertices[vertex].tolist()
         raise InputError(
             f"the point ({point[0]:g}, {point[1]:g}, {point[2]:g}) is {distance.min():.3g} m off the piece "
-            f"{surface.name!r}; its nearest vertex is {vertex} at ({x:.4g}, {y:.4g}, {z:.4g})"
+            f"{surface.name!r}; its nearest vertex is {int(surface.input_index[vertex]) if as_read else vertex} at "
+            f"({x:.4g}, {y:.4g}, {z:.4g})"
         )
     return vertex
 

@@ -75,7 +75,8 @@ def line_between(surface: Surface, start: int | ArrayLike, end: int | ArrayLike,
     """
     a, b = (as_vertex(surface, place, as_read=as_read) for place in (start, end))
     if a == b:
-        raise InputError(f"both ends of the line are vertex {a} of {surface.name!r}: it has no length")
+        named = int(surface.input_index[a]) if as_read else a
+        raise InputError(f"both ends of the line are vertex {named} of {surface.name!r}: it has no length")
     graph = EdgeGraph(surface)
     p = surface.vertices
     chord = p[b] - p[a]
