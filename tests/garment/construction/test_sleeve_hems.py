@@ -68,6 +68,14 @@ def test_bent_elbow_has_a_dart_and_straight_one_none(body: Mannequin, bent: Mann
     assert abs(way[1] / way[0]) > 0.05
 
 
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_one_bent_elbow_gives_both_sleeves_their_darts(body: Mannequin, bent: Mannequin, side: str) -> None:
+    vertices, arm = body.vertices.copy(), body.layout.arms[side]
+    vertices[arm] = bent.vertices[arm]
+    (dart,) = shaped_form(body.layout, shipped_form("shirt"), "none", vertices).darts
+    assert (dart.name, dart.mirrored) == ("elbow dart", True)
+
+
 def test_darts_of_both_sleeves_are_mirror_images(bent: Mannequin) -> None:
     form = bent.form("shirt")
     assert {name for name, piece in form.pieces.items() if "elbow dart left" in piece.darts} == {"sleeve_left"}

@@ -202,6 +202,10 @@ def test_scene_mistakes_are_named(data: dict[str, object], words: str) -> None:
         ({"like": "skirt", "profiles": {"neck": {"scale": 2}}}, "cannot be adjusted"),
         ({"like": "skirt", "profiles": {"knee": {"like": "biceps"}}}, "level of the same part"),
         ({"like": "skirt", "profiles": {"knee": {"raise_cm": 40}}}, "less than 1 cm above"),
+        (
+            {"like": "trousers", "profiles": {"leg_knee": {"raise_cm": 40}}},
+            "leg_thigh comes to lie less than 1 cm above leg_knee",
+        ),
         ({"like": "skirt", "ruled": [["hip", "neck"]]}, "ruled"),
         ({"pieces": {"a": {"bricks": ["waist-hip/*"]}}}, "not one disk"),
         (
@@ -384,6 +388,21 @@ def test_what_a_profile_cannot_do_is_refused(level: str, change: dict[str, Any])
     body = body_of_size(30.0)
     with pytest.raises(InputError, match=f"profile {level}: it is neither bridged nor raised"):
         adjusted_vertices(body.layout, body.vertices, {level: Adjustment(**change)})
+
+
+def test_numbers_of_numpy_are_numbers_in_every_table() -> None:
+    data = {"like": "tshirt", "ease": {"hip": np.int64(4)}, "profiles": {"hip": {"offset_cm": np.int64(1)}}}
+    form = form_from_mapping("mine", data)
+    assert (form.ease["hip"], form.profiles["hip"].offset_cm) == (4.0, 1.0)
+
+
+def test_an_armhole_moves_with_its_own_side_of_the_trunk_whichever_side_that_is() -> None:
+    layout, lean = body_of_size(30.0).layout, body_of_size(30.0).vertices.copy()
+    lean[layout.rings[layout.level_row["waist"]], 0] += 0.04
+    flip = np.array([-1.0, 1.0, 1.0])
+    like_waist = {"bust": Adjustment(like="waist")}
+    left, right = (adjusted_vertices(layout, each, like_waist) for each in (lean, lean[layout.mirror] * flip))
+    assert left == pytest.approx(right[layout.mirror] * flip, abs=1e-6)
 
 
 def test_a_dart_of_another_piece_does_not_stand_for_one_that_a_seam_takes_over() -> None:

@@ -248,6 +248,14 @@ def test_completion_agrees_with_the_table() -> None:
     assert all(made[name] == pytest.approx(of_size[name], abs=2e-5) for name in made)
 
 
+@pytest.mark.parametrize("stature", [1.58, 1.66])
+def test_what_a_size_lacks_is_completed_as_for_a_typed_body(stature: float) -> None:
+    of_size = measurements_from_size(f"JIS 5AR/{100 * stature:g}")
+    made = measurements_from_values(bust=0.77, hip=0.87, stature=stature)
+    assert of_size.lengths == pytest.approx(made.lengths)
+    assert of_size.heights == pytest.approx(made.heights)
+
+
 def test_lengths_down_the_body_go_with_stature() -> None:
     tall, usual = (measurements_from_values(bust=0.84, **at) for at in ({"stature": 1.85}, {}))
     for name in ("nape_to_waist", "armscye_depth"):
@@ -257,6 +265,12 @@ def test_lengths_down_the_body_go_with_stature() -> None:
     assert measurements_from_size("EU 36/185").heights == tall.heights
     given = measurements_from_values(bust=0.84, stature=1.85, nape_to_waist=0.43)
     assert given.lengths["nape_to_waist"] == 0.43
+    # A child's bones are those of its stature, its girths those of its size.
+    child, own, taller = (measurements_from_size(size) for size in ("EU 104/110", "EU 104", "EU 110"))
+    for name in ("shoulder", "nape_to_waist", "arm_length", "inside_leg"):
+        assert child.lengths[name] == pytest.approx(taller.lengths[name])
+    assert child.lengths["bust"] == own.lengths["bust"]
+    assert measurements_from_size("EU 104", stature=1.1, inside_leg=0.45).lengths["inside_leg"] == 0.45
     # Men's tables say what changes with stature, for what is completed too.
     men = measurements_from_values(table="men", bust=1.0, stature=1.88)
     assert men.lengths == pytest.approx(measurements_from_size("men 50/188").lengths)

@@ -9,11 +9,12 @@ from body_tapes import armpit_and_crotch
 from landmarks import Landmarks
 from limb_tapes import arm_tapes, tape_across
 from real_files import needs_data
-from scans import posed_body, posed_scan, scan, scanned_body, triangles_of
+from scans import _read, posed_body, posed_scan, scan, scanned_body, triangles_of
 
 from warpflat.core.errors import InputError
 from warpflat.garment.mannequin.body_model import BodyModel, Person, finer_body, rotation
 from warpflat.garment.mannequin.mannequin import Mannequin
+from warpflat.garment.mannequin.scan_levels import find_levels
 from warpflat.garment.mannequin.scan_pose import across_trunk
 from warpflat.garment.mannequin.slicer import Slicer
 
@@ -97,6 +98,34 @@ def test_trunk_of_two_equal_parts_has_a_direction() -> None:
     left = across_trunk(slicer, np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0]))
     assert abs(left[1]) < 1e-9
     assert np.linalg.norm(left) == pytest.approx(1.0)
+
+
+@needs_data
+@pytest.mark.parametrize(("name", "words"), [("calf", "knee .* above calf"), ("ankle", "calf .* above ankle")])
+def test_levels_of_the_leg_come_in_their_order(name: str, words: str) -> None:
+    read = _read("female")
+    above = {"calf": "knee", "ankle": "calf"}[name]
+    with pytest.raises(InputError, match=words):
+        find_levels(read.body, read.laid, 0.0, {name: read.found[f"leg_{above}"].height + 0.005})
+
+
+@needs_data
+def test_tapes_over_holes_in_chest_and_upper_arm_are_guesses() -> None:
+    points, faces = scan("female")
+    whole = scanned_body("female")
+    x, y, z = points[faces[:, :3]].mean(axis=1).T
+    elbow, upper = (whole.line(f"{name} left").mean(axis=0) for name in ("elbow", "biceps"))
+    share = (whole.measures["biceps left"].height - elbow[1]) / (upper - elbow)[1]
+    arm = elbow + share * (upper - elbow)
+    in_arm = (np.linalg.norm(np.stack([x, y, z], axis=1) - arm, axis=1) < 0.06) & (x > arm[0] - 0.01)
+    in_chest = (np.abs(y - whole.measures["chest, fullest"].height) < 0.03) & (np.abs(x) < 0.07) & (z > 0.0)
+    body = Mannequin.from_scan(points, faces[~(in_arm | in_chest)], resolution_mm=40.0)
+    for name, why in (("biceps left", "does not show the body"), ("chest, fullest", "over a hole in the scan")):
+        guess = body.measures[name].guess
+        assert whole.measures[name].guess is None
+        assert guess is not None
+        assert why in guess
+    assert body.measures["biceps right"].guess is None
 
 
 @needs_data

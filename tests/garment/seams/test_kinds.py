@@ -204,6 +204,16 @@ def test_what_stands_on_its_head_is_turned_upright(make: Callable[[], Surface]) 
     assert any("--up says otherwise" in note for note in upset.notes)
 
 
+@pytest.mark.parametrize("make", [solids.shirt, solids.jumpsuit])
+def test_a_neck_is_lower_in_front(make: Callable[[], Surface]) -> None:
+    plain, ahead = known(make)
+    x, y, z = plain.vertices[plain.faces[:, :3]].mean(axis=1).T
+    low = plain.faces[~((y > 0.5) & (np.abs(x) < 0.1) & (z > 0.0))]
+    behind = anatomy_of(warpflat.make_surface(plain.vertices * [-1.0, 1.0, -1.0], low, component="largest"))
+    assert (describe(behind), axis_name(ahead.front)) == (describe(ahead), "+z")
+    assert axis_name(behind.front) == "-z"
+
+
 @pytest.mark.parametrize(("make", "least"), [(solids.trousers, 0.4), (solids.shirt, 0.5), (solids.jumpsuit, 0.5)])
 def test_a_toys_clothes_are_no_garments_and_a_childs_are(make: Callable[[], Surface], least: float) -> None:
     plain, adult = known(make)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 import seam_solids as solids
 
 import warpflat
 from warpflat.garment.seams import energy
-from warpflat.garment.seams.lines import Offer, first_of_equals, offers
+from warpflat.garment.seams.anatomy import find_anatomy
+from warpflat.garment.seams.find import cloth_of
+from warpflat.garment.seams.lines import Offer, _tailored, first_of_equals, offers
 
 
 def test_what_is_worth_the_same_keeps_its_place_and_rounding_changes_nothing() -> None:
@@ -48,3 +53,18 @@ def test_darts_lead_to_the_bulges_of_a_seat_from_its_borders_but_not_from_the_he
     assert end[1] == pytest.approx(0.42, abs=0.03)
     assert all(one.line.start is not None and one.line.start[1] > 0.02 for one in darts)
     assert darts[0].length > 1.5 * np.linalg.norm(end - start)
+
+
+@pytest.mark.parametrize(("name", "height"), [("yoke left", 0.3), ("yoke-tab", 0.45)])
+def test_a_yoke_goes_on_from_a_seam_that_is_one_and_not_from_one_whose_name_begins_so(name: str, height: float) -> None:
+    cloth = cloth_of(solids.skirt(17))
+    cloth = cloth.with_labels(sleeve=np.full(len(cloth.faces), -1))
+    edges = cloth.half_edges.edges
+    level = edges[np.abs(cloth.vertices[edges, 1] - 0.3).max(axis=1) < 1e-6]
+    cloth = cloth.with_seam(name, level.astype(np.int64))
+    anatomy = find_anatomy(cloth)
+    mesh = next(iter(cloth.without_seam(name).pieces()))
+    piece: Any = SimpleNamespace(mesh=mesh, surface=mesh.as_surface())
+    places = [int(np.abs(mesh.vertices[:, 1] - 0.45).argmin())]
+    lines = {line.name: line for line in _tailored(cloth, piece, places, anatomy, warpflat.SeamOptions())}
+    assert lines["yoke"].point[1] == pytest.approx(height)

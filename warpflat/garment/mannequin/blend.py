@@ -126,9 +126,7 @@ def adjusted_vertices(
         float(vertices[layout.rings[r[0]], 1].mean() + m[:, 1].mean())
         for r, m in zip(rows[:, None], moves, strict=True)
     ]
-    for (low, h0), (high, h1) in itertools.pairwise(zip(RING_LEVELS, heights, strict=True)):
-        if h1 - h0 < 0.01:
-            raise InputError(f"form: profile {high} comes to lie less than 1 cm above {low}; lower raise_cm")
+    _check_order(RING_LEVELS, heights)
     between = np.arange(rows[0], rows[-1] + 1)
     ids = layout.rings[between]
     # Against height, not row number: the spacing of rows changes from one band to the next.
@@ -149,6 +147,13 @@ def adjusted_vertices(
     share = np.linspace(1.0, 0.0, len(layout.neck))[:, None, None]
     out[layout.neck] = vertices[layout.neck] + share * (out[layout.neck[0]] - vertices[layout.neck[0]])
     return out
+
+
+def _check_order(levels: Sequence[str], heights: Sequence[float]) -> None:
+    """Raise InputError unless each of some levels lies above the one before it."""
+    for (low, h0), (high, h1) in itertools.pairwise(zip(levels, heights, strict=True)):
+        if h1 - h0 < 0.01:
+            raise InputError(f"form: profile {high} comes to lie less than 1 cm above {low}; lower raise_cm")
 
 
 def _changed(row: FloatArray, other: FloatArray | None, change: Adjustment, ease_cm: float) -> FloatArray:
@@ -242,7 +247,8 @@ def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: tuple[
             normals = unit(np.column_stack([-tangent[:, 2], np.zeros(len(row)), tangent[:, 0]]))
             move[row] = distance * normals + (chest[0].scale - 1.0) * (body[row] - body[row].mean(axis=0))
             held[local[row]] = True
-    fill_sheet(move, layout, ids, laplacian[~held], np.flatnonzero(~held))
+    free = np.flatnonzero(~held)
+    fill_sheet(move, layout, ids, laplacian[free], free)
     normals = vertex_normals(body, layout.faces)
     reach, side_reach = layout.columns[3] + len(layout.front) // 2, layout.quarter - layout.to_princess
     around, beside = np.arange(-reach, reach + 1), np.arange(-side_reach + 1, side_reach)
@@ -251,7 +257,7 @@ def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: tuple[
         of_trunk = unit(normals[at_bust] * [1.0, 0.0, 1.0])
         outward = float(move[at_bust] @ of_trunk)
         if outward <= 0.0:
-            break
+            continue
         # Beyond the rounded web of the armpit.
         bisector = unit(of_trunk + normals[layout.arms[side][layout.arm_row["biceps"] // 2, 0]])
         wished = outward / max(float(bisector @ of_trunk), _LEAST_MITRE) * bisector
@@ -266,7 +272,7 @@ def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: tuple[
         rows = layout.rings[first : bust + 1, (column + beside) % layout.rings.shape[1]]
         move[rows, 1] += float(more[1]) * share * smoothstep(1.0 - np.abs(beside) / side_reach)
         held[local[loop]] = True
-    else:
+    if held[free].any():
         fill_sheet(move, layout, ids, laplacian[~held], np.flatnonzero(~held))
     out[ids] = body[ids] + move[ids]
     out[layout.rings[: bust + 1]] = (body + move)[layout.rings[: bust + 1]]
@@ -337,6 +343,7 @@ def _move_legs(
         rows = np.array([layout.leg_row[level] for level in LEG_LEVELS[1:]])
         between = np.arange(rows[0], rows[-1] + 1)
         out[grid[between]] = body[grid[between]] + PchipInterpolator(rows, np.stack(moves), axis=0)(between)
+        _check_order(LEG_LEVELS[:0:-1], [float(out[grid[row], 1].mean()) for row in rows[::-1]])
     move = out - body
     fill_fork(move, layout)
 

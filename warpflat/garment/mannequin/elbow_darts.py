@@ -28,11 +28,14 @@ def elbow_darts(layout: Layout, bricks: Mapping[str, Sequence[str]], vertices: F
         bricks: by piece, both sides of the body.
         vertices: the body's, #V by 3 [m].
     """
-    rows = [layout.arms["left"][layout.arm_row[level]] for level in ("biceps", "elbow", "wrist")]
-    upper, lower = np.diff([vertices[row].mean(axis=0) for row in rows], axis=0)
-    cosine = upper @ lower / (np.linalg.norm(upper) * np.linalg.norm(lower))
-    # The angle between upper arm and forearm; 0 is straight.
-    if np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))) <= _BENT:
+    rows, bends = [layout.arm_row[level] for level in ("biceps", "elbow", "wrist")], list[float]()
+    for arm in layout.arms.values():
+        upper, lower = np.diff(vertices[arm[rows]].mean(axis=1), axis=0)
+        cosine = upper @ lower / (np.linalg.norm(upper) * np.linalg.norm(lower))
+        # The angle between upper arm and forearm; 0 is straight.
+        bends.append(float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))))
+    # Both sleeves are cut alike.
+    if max(bends) <= _BENT:
         return ()
     around = {"biceps-elbow/arm-left-back", "elbow-forearm/arm-left-back"}
     sleeves = [piece for piece, chosen in bricks.items() if around <= set(chosen)]

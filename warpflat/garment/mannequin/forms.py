@@ -16,6 +16,7 @@ from warpflat.core import (
     IntArray,
     arc_lengths,
     check_file_name,
+    is_number,
     nearest,
     quote_value,
     read_toml,
@@ -437,7 +438,7 @@ def _surface(
 
 
 def _number(value: object, where: str, low: float, high: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+    if not is_number(value) or not low <= value <= high:
         raise InputError(f"{where} = {quote_value(value)}: a number from {low:g} to {high:g} is needed")
     return float(value)
 

@@ -252,14 +252,18 @@ class _Completion:
                 self._fill("stature", stature, f"is the {table} table's stature")
         rules = self._body["complete"]
         # They stand between two others, and must not stay where a table has them when one of these has moved.
-        self._between = {n for n, rule in rules.items() if set(rule.get("between", ())) & set(given)} - set(given)
-        for name, value in (of_size or {}).items():
+        of_size = of_size or {}
+        moved = {name: set(given) if name in of_size else {*given, *of_size} for name in rules}
+        self._between = {n for n, rule in rules.items() if set(rule.get("between", ())) & moved[n]} - set(given)
+        # Nor must a child's bones where its size has them when it is as tall as another one's.
+        bones = set(self._rows.get("by_stature", ())) if "stature" in given else set[str]()
+        for name, value in of_size.items():
             if name in given:
                 self._notes.append(
                     f"{name} = {given[name] * 100:.1f} cm instead of the {value * 100:.1f} cm of {title}"
                 )
-            elif name not in self._between:
-                self._lengths[name] = self._at_stature(name, value)
+            elif name not in self._between | bones:
+                self._lengths[name] = self._at_stature(name, value, self._own)
         if of_size:
             self._known = set(self._lengths)
 
@@ -293,7 +297,7 @@ class _Completion:
                 slope = (y[-1] - y[0]) / (x[-1] - x[0])
                 beyond = at - min(max(at, x[0]), x[-1])
                 # Bones grow less than girths: what lies beyond the table's ends must not run off to nothing or to a giant.
-                value = self._at_stature(name, float(max(inside + slope * beyond, 0.55 * y[0])) / 100.0)
+                value = self._at_stature(name, float(max(inside + slope * beyond, 0.55 * y[0])) / 100.0, self._rows)
                 self._fill(name, value, f"from {key} by the {self._name} table")
         for name, rule in self._body["complete"].items():
             if name in lengths:
@@ -350,9 +354,9 @@ class _Completion:
         self._lengths[name] = value
         self._notes.append(f"{name} = {value * 100:.1f} cm {how}")
 
-    def _at_stature(self, name: str, value: float) -> float:
-        """Return a length [m] at the stature of the own table, at that of the body."""
-        of_table = self._own["stature"] / 100.0
+    def _at_stature(self, name: str, value: float, table: Mapping[str, Any]) -> float:
+        """Return a length [m] that a table has at its stature, at that of the body."""
+        of_table = table["stature"] / 100.0
         step = self._rows.get("stature_step", {})
         if name in step:
             return float(value + (self._lengths["stature"] - of_table) / step["per"] * step[name])

@@ -98,9 +98,7 @@ def find_levels(
                 # Each is a few millimetres off the joint by itself.
                 sides.append(ScanLevel(height=0.5 * (at + crease), guess=unsure_of(noise)))
         guess = next((each.guess for each in sides if each.guess), None)
-        found[f"leg_{name}"] = ScanLevel(height=0.5 * (sides[0].height + sides[1].height), guess=guess)
-        if name != "calf":
-            found[name] = found[f"leg_{name}"]
+        found[name] = found[f"leg_{name}"] = ScanLevel(height=0.5 * (sides[0].height + sides[1].height), guess=guess)
     found["leg_thigh"] = ScanLevel(height=body.crotch - BELOW_CROTCH * size)
     hip = given.get("hip", found["hip"].height)
     found["thigh"] = ScanLevel(height=min(0.44 * size, body.crotch - 0.01 * size, hip - 0.05 * size))

@@ -38,6 +38,8 @@ _FOLD_OF_ARM, _LEAP_OF_ARM = 0.012, 0.02
 _FINGERS_PART = 0.92
 # A belly of the upper arm is one if it is so full, as a share of the fullest tape.
 _BELLY = 0.98
+# Vertices so near to a tape show whether the scan does, as a share of the stature.
+_NEAR_TAPE = 0.012
 # An arm above the level of its shoulder [rad] draws the shoulder's flesh into the tapes around it.
 _OVERHEAD = np.radians(90.0)
 # What the flesh of a body that sits does not show.
@@ -93,10 +95,10 @@ def body_measures(read: ReadBody, neck: float, given: Mapping[str, float]) -> di
     armpit = standing["armpit"].height
     chest = np.flatnonzero((t.y > standing["underbust"].height) & (t.y <= armpit))
     row = int(chest[np.argmax(t.girth[chest])])
+    guess = f"the chest grows fuller up to the armpits at {armpit:.3f} m" if row == chest[-1] else None
     found["chest, fullest"] = ScanMeasure(
-        height=float(t.y[row]), girth=float(t.girth[row]),
-        guess=f"the chest grows fuller up to the armpits at {armpit:.3f} m" if row == chest[-1] else None,
-    )  # fmt: skip
+        height=float(t.y[row]), girth=float(t.girth[row]), guess=guess or (_HOLED if t.holed[row] else None)
+    )
     for name in TRUNK:
         at = standing[name].height
         holed = t.holed[int(np.argmin(np.abs(t.y - at)))]
@@ -110,7 +112,7 @@ def body_measures(read: ReadBody, neck: float, given: Mapping[str, float]) -> di
             # It is narrowest near its landmark.
             ahead = np.arange(arm.wrist - _WRIST * size, arm.wrist + _WRIST * size, 0.0015 * size)
             places["wrist"] = float(ahead[np.argmin([arm.tape(s)[1] for s in ahead])])
-        found[f"biceps {side}"] = _biceps(body, side, noise)
+        found[f"biceps {side}"] = _biceps(body, laid, side, noise)
         for name, s in places.items():
             height, girth = arm.tape(s)
             guess = laid.unsure_near(near_place(ARM_PLACES[name], side)[0]) or unsure_of(noise)
@@ -122,7 +124,7 @@ def body_measures(read: ReadBody, neck: float, given: Mapping[str, float]) -> di
         for name in ("thigh", "knee", "calf", "ankle"):
             level = levels[f"leg_{name}"]
             rows = np.flatnonzero(
-                model_places().strips[f"leg {side}"] & (np.abs(body.vertices[:, 1] - level.height) < 0.012 * size)
+                model_places().strips[f"leg {side}"] & (np.abs(body.vertices[:, 1] - level.height) < _NEAR_TAPE * size)
             )
             found[f"{name} {side}"] = ScanMeasure(
                 height=level.height, girth=float(np.interp(level.height, body.legs.y, body.legs.girths[side])),
@@ -220,7 +222,7 @@ def _head(slicer: Slicer, stature: float) -> ScanMeasure | None:
     )
 
 
-def _biceps(body: BodySections, side: str, noise: float) -> ScanMeasure:
+def _biceps(body: BodySections, laid: StandingBody, side: str, noise: float) -> ScanMeasure:
     """Return the fullest tape across the upper arm's bone, from beyond the armpit to the elbow.
 
     The muscle's belly counts before the shoulder's flesh at the upper end, which a lowered arm presses out.
@@ -245,10 +247,8 @@ def _biceps(body: BodySections, side: str, noise: float) -> ScanMeasure:
     way = unit(arm.way[rows].mean(axis=0))
     middle = arm.line[rows].mean(axis=0)
     end = float((arm.frame(arm.elbow)[0] - middle) @ way) - 0.02
-    tapes = [
-        tape_around(arm.cut(middle + at * way, way), way)
-        for at in np.arange(float((armpit - middle) @ way) + _BEYOND_ARMPIT * size, end, 0.002)
-    ]
+    along = np.arange(float((armpit - middle) @ way) + _BEYOND_ARMPIT * size, end, 0.002)
+    tapes = [tape_around(arm.cut(middle + at * way, way), way) for at in along]
     if len(tapes) < 3:
         raise InputError(f"scan: no upper arm between the armpit at {armpit[1]:.2f} m and the elbow; give landmarks")
     girths = smooth(np.array([girth for _, girth in tapes]), 1.0)
@@ -260,7 +260,9 @@ def _biceps(body: BodySections, side: str, noise: float) -> ScanMeasure:
     guess = (
         "the arm is as full a way up and down from there" if np.abs(alike - heights[row]).max() > ISO_HEIGHT else None
     )
-    return ScanMeasure(height=tapes[row][0], girth=tapes[row][1], guess=guess)
+    near = np.abs((body.vertices - middle) @ way - along[row]) < _NEAR_TAPE * size
+    unsure = laid.unsure_near(np.flatnonzero(model_places().strips[f"arm {side}"] & near))
+    return ScanMeasure(height=tapes[row][0], girth=tapes[row][1], guess=unsure or guess)
 
 
 def _hand(scan: Slicer, body: BodySections, laid: StandingBody, side: str) -> ScanMeasure | None:

@@ -722,7 +722,7 @@ def _faces_backwards(
         behind = len(inner) > 0 and np.median(depth[inner]) < np.median(depth) - 0.02 * cloth.size
         return f"it opens {told}" if behind else ""
     neck = next((border.vertices for border in borders if border.role == "neck"), None)
-    if neck is not None and kind in ("top", "dress"):
+    if neck is not None and kind in FROM_SHOULDERS:
         ahead = depth[neck] > np.median(depth[neck])
         front, back = (np.quantile(heights[neck[chosen]], 0.1) for chosen in (ahead, ~ahead))
         return f"its neck is lower {told}" if front - back > 0.06 * cloth.size else ""

@@ -20,7 +20,7 @@ from warpflat.garment.seams.by_hand import level_of
 from warpflat.garment.seams.cloth import ALIKE, Cloth
 from warpflat.garment.seams.fields import TriangleMesh
 from warpflat.garment.seams.measure import Measured
-from warpflat.garment.seams.options import SeamOptions
+from warpflat.garment.seams.options import SeamOptions, in_family
 from warpflat.garment.seams.tailor import FACING, LEFT
 
 __all__ = ["APART", "WAIST", "Line", "Offer", "first_of_equals", "offers"]
@@ -307,7 +307,7 @@ def _tailored(
             waist = level_of(cloth, anatomy, WAIST, options)
         if waist is not None and 0.2 * tall < waist - heights.min() < 0.8 * tall:
             name, level = WAIST, waist
-        known = [edges for other, edges in cloth.seams.items() if other.startswith(name)]
+        known = [edges for other, edges in cloth.seams.items() if in_family(other, name)]
         if known:
             # Front and back meet at the sides.
             level = float((cloth.vertices[np.unique(known[0])] @ anatomy.up).mean())
